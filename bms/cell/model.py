@@ -1,0 +1,60 @@
+"""Right-hand side of the cell model; every function takes floats or arrays of one shape."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from bms.cell.parameters import CellParameters
+
+
+class CellState(NamedTuple):
+    """State of charge (-) and core, surface and coolant temperature (K)."""
+
+    soc: Any
+    core_temperature_K: Any
+    surface_temperature_K: Any
+    coolant_temperature_K: Any
+
+
+class Disturbance(NamedTuple):
+    """What the model does not know: additions to the four rates (1/s, K/s, K/s, K/s)."""
+
+    soc_per_s: Any = 0.0
+    core_K_per_s: Any = 0.0
+    surface_K_per_s: Any = 0.0
+    coolant_K_per_s: Any = 0.0
+
+
+NO_DISTURBANCE = Disturbance()
+
+
+def rates(
+    cell: CellParameters,
+    state: CellState,
+    current_A: Any,
+    cooling_power_W: Any,
+    disturbance: Disturbance = NO_DISTURBANCE,
+) -> CellState:
+    """Time derivative of the state (1/s, K/s, K/s, K/s); the current is negative while charging.
+
+    Source: paper, equation of the electro-thermal dynamics, with the coolant's own heat capacity.
+    """
+    _, core, surface, coolant = state
+    core_to_surface_W = (core - surface) / cell.core_resistance_K_per_W
+    surface_to_coolant_W = (surface - coolant) / cell.surface_resistance_K_per_W
+    heat_W = (
+        cell.ohmic_resistance_ohm * current_A - cell.entropic_coefficient_V_per_K * core
+    ) * current_A
+    return CellState(
+        disturbance.soc_per_s - current_A / cell.capacity_As,
+        disturbance.core_K_per_s + (heat_W - core_to_surface_W) / cell.core_heat_capacity_J_per_K,
+        disturbance.surface_K_per_s
+        + (core_to_surface_W - surface_to_coolant_W) / cell.surface_heat_capacity_J_per_K,
+        disturbance.coolant_K_per_s
+        + (surface_to_coolant_W - cooling_power_W) / cell.coolant_heat_capacity_J_per_K,
+    )
+
+
+def terminal_voltage_V(cell: CellParameters, soc: Any, current_A: Any) -> Any:
+    """Terminal voltage in V: open-circuit voltage less the ohmic drop (paper, output equation)."""
+    return cell.ocv(soc) - current_A * cell.ohmic_resistance_ohm

@@ -1,0 +1,19 @@
+"""The errors that a user can cause or has to act on; the command line prints them as one line."""
+
+from __future__ import annotations
+
+
+class BmsError(Exception):
+    """Base of every error of this project that a user can act on."""
+
+
+class InputError(BmsError, ValueError):
+    """A file, option or value that cannot be used; the message says what, where and the remedy."""
+
+
+class ModelMismatchError(InputError):
+    """A model, preset or image that do not belong together."""
+
+
+class BusError(BmsError):
+    """A CAN bus that cannot be opened or does not answer."""
