@@ -3,63 +3,49 @@
 from __future__ import annotations
 
 import sys
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 
-import click
 import typer
-from typer.core import TyperGroup
-from typer.main import get_command
+from typer.exceptions import Abort, TyperException
 
 from bms.errors import BmsError
 
-EXIT_DONE, EXIT_CHECK_FAILED, EXIT_WRONG_USE = 0, 1, 2
+EXIT_DONE, EXIT_CHECK_FAILED, EXIT_WRONG_USE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
 
-def _commands() -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group="bms.commands")}
-
-
-class _LazyGroup(TyperGroup):
-    """Imports a subcommand only when it is asked for, so that `bms ecu` starts fast."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return sorted(_commands())
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        entry = _commands().get(cmd_name)
-        if entry is None:
-            return None
-        app = typer.Typer(add_completion=False)
-        app.command(name=cmd_name)(entry.load())
-        return get_command(app)
-
-
-app = typer.Typer(
-    cls=_LazyGroup,
-    add_completion=False,
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    help="Battery-management firmware simulator: train, export, build and charge over a CAN bus.",
-)
-
-
-@app.callback()
 def _root() -> None:
-    """Battery-management firmware simulator. Currents are negative while charging; SI units."""
+    """Battery-management firmware simulator. SI units; currents are negative while charging.
+
+    Example: bms sil --preset paper_calibrated --out out/run
+    """
+
+
+def _application(arguments: list[str]) -> typer.Typer:
+    """Application with the command that is asked for, or with all when none is named.
+
+    Loading one only keeps the start of `bms ecu` short.
+    """
+    commands = {entry.name: entry for entry in entry_points(group="bms.commands")}
+    wanted = arguments[0] if arguments else ""
+    names = [wanted] if wanted in commands else sorted(commands)
+    app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
+    app.callback()(_root)
+    for name in names:
+        app.command(name=name)(commands[name].load())
+    return app
 
 
 def main() -> None:
-    """Run the command line; errors that a user can act on become one line and exit code 2."""
-    command = get_command(app)
+    """Run the command line; what a user can act on becomes one line on stderr and exit code 2."""
     try:
-        code = command.main(standalone_mode=False)
+        code = _application(sys.argv[1:])(standalone_mode=False)
     except BmsError as error:
         print(f"bms: {error}", file=sys.stderr)
         sys.exit(EXIT_WRONG_USE)
-    except click.ClickException as error:
+    except TyperException as error:
         print(f"bms: {error.format_message()}; see 'bms --help'", file=sys.stderr)
         sys.exit(EXIT_WRONG_USE)
-    except (KeyboardInterrupt, click.Abort):
+    except (KeyboardInterrupt, Abort):
         print("bms: interrupted", file=sys.stderr)
-        sys.exit(130)
+        sys.exit(EXIT_INTERRUPTED)
     sys.exit(code if isinstance(code, int) else EXIT_DONE)

@@ -35,7 +35,7 @@ class OpenCircuitVoltage:
 
     def __call__(self, soc: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Voltage in V at a state of charge of any shape; held constant outside 0..1."""
-        return np.interp(soc, self.soc, self.voltage_V)
+        return np.interp(np.asarray(soc, dtype=np.float64), self.soc, self.voltage_V)
 
     def slopes_V(self) -> npt.NDArray[np.float64]:
         """Slope dV/dSoC in V of each table segment."""
@@ -45,7 +45,7 @@ class OpenCircuitVoltage:
 @strict
 @dataclass(frozen=True)
 class CellParameters:
-    """Lumped electro-thermal parameters of one cell with its coolant (paper, equation of the model).
+    """Lumped electro-thermal parameters of one cell with its coolant (paper, cell model).
 
     The entropic coefficient is dU/dT: with a current that is negative while charging, a positive
     value heats the core during charge.

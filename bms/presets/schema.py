@@ -181,9 +181,7 @@ class Preset:
     @property
     def training_hash(self) -> str:
         """SHA-256 of what the estimator's training data depends on: cell, uncertainty and box."""
-        return _digest(
-            [asdict(self.cell), asdict(self.uncertainty), asdict(self.operating_box)]
-        )
+        return _digest([asdict(self.cell), asdict(self.uncertainty), asdict(self.operating_box)])
 
 
 def _digest(content: object) -> str:

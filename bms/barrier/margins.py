@@ -1,0 +1,131 @@
+"""What sampling, delay, sensors and the bus subtract from the four constraints.
+
+A command computed from a measurement at time t acts until t + h, h = control period + delay. If
+each left-hand side can fall by no more than its margin within h, and by no more through
+measurement errors, then a decision that leaves at least the margin keeps the continuous-time
+condition at every instant between samples. This is the method of Breeden, Garg and Panagou 2021
+(Theorem 3) applied to the constraint itself; docs/theory.md has the derivation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bms.barrier.constants import barrier_constants
+from bms.cell import CellParameters
+from bms.presets.schema import Preset
+
+COUNTING_HORIZON_S = 3600.0
+"""Longest charge over which coulomb counting has to stay within its error bound."""
+
+
+@dataclass(frozen=True)
+class BusQuantisation:
+    """Half a step of each measured signal on the bus; equal to the CAN database by a test."""
+
+    current_A: float = 0.001
+    surface_temperature_K: float = 0.0025
+    coolant_temperature_K: float = 0.0025
+    cooling_power_W: float = 0.0005
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Subtracted from the left-hand sides of the voltage, SoC, core and surface constraints."""
+
+    voltage_V: Any
+    soc_per_s: Any
+    core_K_per_s: Any
+    surface_K_per_s2: Any
+
+
+def temperature_rate_bound_K_per_s(cell: CellParameters, preset: Preset) -> Any:
+    """Largest rate of any of the three temperatures while charging, from a start at rest.
+
+    The heat flows core -> surface -> coolant stay within the range of heat generation and cooling,
+    which bounds the core's and the coolant's rate directly; the surface's rate is a low-pass mean
+    of the two and can exceed neither.
+    """
+    current_A = -preset.limits.reference_current_A
+    reversible_W = (
+        np.abs(cell.entropic_coefficient_V_per_K) * preset.limits.max_core_temperature_K * current_A
+    )
+    cooling_W = preset.operating_box.cooling_power_W[1]
+    largest_W = cell.ohmic_resistance_ohm * current_A**2 + reversible_W
+    smallest_W = -reversible_W * (np.asarray(cell.entropic_coefficient_V_per_K) < 0)
+    bounds = preset.uncertainty
+    disturbance = bounds.core_K_per_s + bounds.surface_K_per_s + bounds.coolant_K_per_s
+    return (
+        np.maximum(
+            (largest_W - smallest_W) / cell.core_heat_capacity_J_per_K,
+            np.maximum(largest_W, cooling_W - smallest_W) / cell.coolant_heat_capacity_J_per_K,
+        )
+        + 2.0 * disturbance
+    )
+
+
+def soc_error_bound(cell: CellParameters, preset: Preset, bus: BusQuantisation) -> float:
+    """Bound on the counted state of charge: bias and rounding add up, noise adds as its root."""
+    sensor = preset.sensors.current_A
+    steady_A = abs(sensor.bias) + 0.5 * sensor.resolution + bus.current_A
+    noise_As = (
+        sensor.NOISE_CUTOFF
+        * sensor.noise_std
+        * float(np.sqrt(preset.timing.sampling_period_s * COUNTING_HORIZON_S))
+    )
+    return (steady_A * COUNTING_HORIZON_S + noise_As) / cell.capacity_As
+
+
+def sampling_margins(
+    cell: CellParameters, preset: Preset, bus: BusQuantisation = BusQuantisation()
+) -> Margins:
+    """Margins for a cell with the timing, sensors and limits of a preset (V, 1/s, K/s, K/s^2)."""
+    constants = barrier_constants(cell, preset)
+    sensors, limits = preset.sensors, preset.limits
+    current_A = -limits.reference_current_A
+    held_s = preset.timing.sampling_period_s + preset.timing.delay_s
+    rate = temperature_rate_bound_K_per_s(cell, preset)
+    core_gain = preset.gains.core_gain_per_s(cell)
+
+    soc_change = held_s * current_A / cell.capacity_As + soc_error_bound(cell, preset, bus)
+    upper_V, lower_soc = np.asarray(cell.ocv.voltage_V[1:]), np.asarray(cell.ocv.soc[:-1])
+    near_limit = np.logical_and(
+        upper_V[..., None] + current_A * cell.ohmic_resistance_ohm > limits.max_voltage_V,
+        (lower_soc < limits.completion_soc + soc_change)[..., None],
+    )
+    steepest_V = np.max(np.where(near_limit, cell.ocv.slopes_V()[..., None], 0.0), axis=0)
+
+    surface_error_K = sensors.surface_temperature_K.error_bound + bus.surface_temperature_K
+    coolant_error_K = sensors.coolant_temperature_K.error_bound + bus.coolant_temperature_K
+    cooling_error_W = sensors.cooling_power_W.error_bound + bus.cooling_power_W
+
+    core_slope = rate * (
+        np.abs(core_gain - constants.a1_per_s)
+        + constants.a1_per_s
+        + np.abs(constants.a2_per_As) * current_A
+    )
+    surface_slope = rate * (
+        2.0 * np.abs(constants.a4_per_s2)
+        + 2.0 * np.abs(constants.a6_per_s2)
+        + preset.gains.alpha3_per_s2
+        + np.abs(constants.a8_per_As2) * current_A
+    )
+    return Margins(
+        voltage_V=_plain(steepest_V * soc_change),
+        soc_per_s=_plain(preset.gains.alpha1_per_s * soc_change),
+        core_K_per_s=_plain(held_s * core_slope + constants.a1_per_s * surface_error_K),
+        surface_K_per_s2=_plain(
+            held_s * surface_slope
+            + np.abs(constants.a5_per_s2) * surface_error_K
+            + np.abs(constants.a6_per_s2) * coolant_error_K
+            + constants.a10_K_per_Ws2 * cooling_error_W
+        ),
+    )
+
+
+def _plain(value: Any) -> Any:
+    """A float where the parameters were numbers, an array where they were arrays."""
+    return float(np.squeeze(value)) if np.size(value) == 1 else value

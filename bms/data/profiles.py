@@ -1,0 +1,106 @@
+"""Charging profiles that training and test data are simulated from.
+
+Every profile begins at thermal rest (core, surface and coolant at one temperature), as a charge
+does, with a current step at its first sample. Temperatures, cooling powers and constant currents
+are spread evenly over the operating box by Latin hypercubes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from bms.presets import Preset
+
+Array = npt.NDArray[np.float64]
+Kind = Literal["constant", "dynamic"]
+KINDS: tuple[Kind, ...] = ("constant", "dynamic")
+
+SAMPLE_PERIOD_S = 1.0
+_DURATION_S = {"constant": 1800.0, "dynamic": 1200.0}
+_COLDEST_START_ABOVE_BOX_K = 2.0
+_WARMEST_START_BELOW_BOX_K = 8.0
+_MAX_INITIAL_SOC = 0.5
+_SHARE_OF_RESTS = 0.2
+_SHARE_OF_STEPS = 0.25
+_HOLD_S = (30.0, 300.0)
+_RAMP_A_PER_S = (0.05, 1.0)
+_CORE_LIMIT_BELOW_BOX_K = (1.0, 25.0)
+
+
+@dataclass(frozen=True)
+class Profiles:
+    """Profiles of one kind: wanted current (P, S) in A, the other arrays of shape (P,).
+
+    While the core comes near `core_limit_K` the current is derated (infinite: never).
+    """
+
+    kind: Kind
+    wanted_current_A: Array
+    cooling_power_W: Array
+    initial_temperature_K: Array
+    initial_soc: Array
+    core_limit_K: Array
+
+
+def draw_profiles(preset: Preset, kind: Kind, count: int, rng: np.random.Generator) -> Profiles:
+    """Random profiles over the preset's operating box.
+
+    Constant: one current from rest, all magnitudes alike. Dynamic: levels held for 30 s to 300 s,
+    a fifth of them rests, joined by ramps of 0.05 to 1 A/s and, one in four, by steps; derated as
+    a barrier controller does when the core reaches a limit that differs from profile to profile.
+    """
+    box = preset.operating_box
+    shares = _latin_hypercube(count, 5, rng)
+    low_K = box.surface_temperature_K[0] + _COLDEST_START_ABOVE_BOX_K
+    high_K = box.surface_temperature_K[1] - _WARMEST_START_BELOW_BOX_K
+    steps = round(_DURATION_S[kind] / SAMPLE_PERIOD_S)
+    if kind == "constant":
+        current_A = np.repeat(_between(shares[:, :1], *box.current_A), steps, axis=1)
+        core_limit_K = np.full(count, np.inf)
+    else:
+        current_A = np.stack([_wandering_current_A(box.current_A, steps, rng) for _ in shares])
+        near_K, far_K = _CORE_LIMIT_BELOW_BOX_K
+        core_limit_K = box.surface_temperature_K[1] - _between(shares[:, 4], near_K, far_K)
+    return Profiles(
+        kind,
+        current_A,
+        _between(shares[:, 1], *box.cooling_power_W),
+        _between(shares[:, 2], low_K, high_K),
+        _between(shares[:, 3], 0.0, _MAX_INITIAL_SOC),
+        core_limit_K,
+    )
+
+
+def _wandering_current_A(
+    limits_A: tuple[float, float], steps: int, rng: np.random.Generator
+) -> Array:
+    """Levels, ramps, steps and rests, one value for each sample."""
+    times_s, currents_A = [0.0], [_level_A(limits_A, rng)]
+    while times_s[-1] < steps * SAMPLE_PERIOD_S:
+        held_until_s = times_s[-1] + rng.uniform(*_HOLD_S)
+        level_A = _level_A(limits_A, rng)
+        change_A = abs(level_A - currents_A[-1])
+        is_step = rng.random() < _SHARE_OF_STEPS
+        ramp_s = SAMPLE_PERIOD_S if is_step else change_A / np.exp(
+            rng.uniform(*np.log(_RAMP_A_PER_S))
+        )
+        times_s += [held_until_s, held_until_s + ramp_s]
+        currents_A += [currents_A[-1], level_A]
+    return np.interp(np.arange(steps) * SAMPLE_PERIOD_S, times_s, currents_A)
+
+
+def _level_A(limits_A: tuple[float, float], rng: np.random.Generator) -> float:
+    return 0.0 if rng.random() < _SHARE_OF_RESTS else float(rng.uniform(*limits_A))
+
+
+def _latin_hypercube(count: int, dimensions: int, rng: np.random.Generator) -> Array:
+    strata = np.stack([rng.permutation(count) for _ in range(dimensions)], axis=1)
+    return (strata + rng.random(strata.shape)) / count
+
+
+def _between(share: Array, low: float, high: float) -> Array:
+    return low + share * (high - low)

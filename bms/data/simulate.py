@@ -1,0 +1,69 @@
+"""Simulation of profiles with the cell model, all profiles at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bms.cell import CellParameters, CellState, Disturbance, integrate_step
+from bms.data.profiles import SAMPLE_PERIOD_S, Array, Profiles
+from bms.presets import Preset
+
+PROCESS_NOISE_K_PER_S = 5e-4
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Samples of several profiles: inputs (N, 4), core temperature (N,) in K, profile number (N,).
+
+    Inputs are in the estimator's order: current in A, cooling power in W, surface and coolant
+    temperature in K.
+    """
+
+    inputs: Array
+    core_temperature_K: Array
+    profile: Array
+
+
+def simulate(preset: Preset, profiles: Profiles, rng: np.random.Generator) -> Samples:
+    """Samples of every profile from its first step until the cell is full or leaves the box.
+
+    The current of a sample acts until the next one; the thermal rates carry process noise of
+    5e-4 N(0, 1) K/s (paper, section "Estimating core temperature using KAN").
+    """
+    cell, box = preset.cell, preset.operating_box
+    start_K = profiles.initial_temperature_K
+    state = CellState(profiles.initial_soc, start_K, start_K, start_K)
+    alive = np.ones(len(start_K), dtype=bool)
+    rows, cores, numbers = [], [], []
+    for wanted_A in profiles.wanted_current_A.T:
+        current_A = np.maximum(wanted_A, _derated_current_A(cell, state, profiles.core_limit_K))
+        inputs = np.stack(
+            [current_A, profiles.cooling_power_W, state.surface_temperature_K,
+             state.coolant_temperature_K], axis=1,
+        )
+        low, high = np.transpose(box.ranges())
+        alive &= np.all((inputs >= low) & (inputs <= high), axis=1) & (state.soc <= 1.0)
+        rows.append(inputs[alive])
+        cores.append(state.core_temperature_K[alive])
+        numbers.append(np.flatnonzero(alive))
+        noise = PROCESS_NOISE_K_PER_S * rng.standard_normal((3, len(start_K)))
+        state = integrate_step(
+            cell, state, current_A, profiles.cooling_power_W, SAMPLE_PERIOD_S,
+            Disturbance(0.0, *noise),
+        )
+    return Samples(np.concatenate(rows), np.concatenate(cores), np.concatenate(numbers))
+
+
+def _derated_current_A(cell: CellParameters, state: CellState, core_limit_K: Array) -> Array:
+    """Charging current at which dTc/dt = (limit - Tc)/(Rc Cc), as a core barrier would allow.
+
+    Root of the core constraint of the paper without margins; 0 where even no current is too much.
+    """
+    core_K = state.core_temperature_K
+    slope = cell.entropic_coefficient_V_per_K * core_K
+    spare_W = (core_limit_K - state.surface_temperature_K) / cell.core_resistance_K_per_W
+    resistance = cell.ohmic_resistance_ohm
+    root = np.sqrt(np.maximum(slope**2 + 4.0 * resistance * np.maximum(spare_W, 0.0), 0.0))
+    return np.minimum((slope - root) / (2.0 * resistance), 0.0)

@@ -1,0 +1,40 @@
+"""What a training run can be told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from annotated_types import Ge, MinLen
+
+from bms.errors import InputError
+from bms.validation import NonNegative, strict
+
+Count = Annotated[int, Ge(1)]
+
+
+@strict
+@dataclass(frozen=True)
+class TrainingSettings:
+    """Shape of the network and hyper-parameters; the defaults are the paper's table.
+
+    `refinement_steps` L-BFGS steps without penalties follow the epochs; the paper has none.
+    Raises InputError for a width that does not end in one output.
+    """
+
+    width: Annotated[tuple[Count, ...], MinLen(2)] = (4, 1, 1)
+    grid: Count = 2
+    degree: Count = 3
+    epochs: Annotated[int, Ge(0)] = 70
+    grid_update_stop: Annotated[int, Ge(0)] = 50
+    batch: Count = 2**14
+    regularisation: NonNegative = 5e-5
+    l1_penalty: NonNegative = 0.14
+    entropy_penalty: NonNegative = 0.17
+    refinement_steps: Annotated[int, Ge(0)] = 400
+    starts: Count = 1
+    seed: Annotated[int, Ge(0)] = 0
+
+    def __post_init__(self) -> None:
+        if self.width[-1] != 1:
+            raise InputError("width: must end in 1, the core temperature")
