@@ -25,7 +25,7 @@ from bms.presets.schema import Preset
 
 @dataclass(frozen=True)
 class BarrierConstants:
-    """Coefficients A1..A10 and Delta4 (paper, Table of constants, corrected as in docs/theory.md)."""
+    """Coefficients A1..A10 and Delta4 (paper, table of constants, corrected: docs/theory.md)."""
 
     a1_per_s: Any
     a2_per_As: Any

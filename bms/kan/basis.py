@@ -38,7 +38,7 @@ def extended_knots(grid: Array, degree: int) -> Array:
 
 
 def basis(x: Array, knots: Array, degree: int) -> Array:
-    """All B-splines at x, shape (N, G + degree), for x (N,) within the grid.
+    """All B-splines at x, shape (G + degree, N), for x (N,) within the grid.
 
     Cox-de Boor recursion; at the last grid point the value is the limit from the left, because
     the knots go on.
@@ -47,21 +47,19 @@ def basis(x: Array, knots: Array, degree: int) -> Array:
 
 
 def basis_with_slope(x: Array, knots: Array, degree: int) -> tuple[Array, Array]:
-    """B-splines and their derivatives at x, each of shape (N, G + degree)."""
+    """B-splines and their derivatives at x (N,), each of shape (G + degree, N)."""
     lower, values = _orders(x, knots, degree)[-2:]
-    count = values.shape[1]
-    scaled = lower * (degree / (knots[degree:] - knots[:-degree]))
-    return values, scaled[:, :count] - scaled[:, 1 : count + 1]
+    scaled = lower * (degree / (knots[degree:] - knots[:-degree]))[:, None]
+    return values, scaled[:-1] - scaled[1:]
 
 
 def _orders(x: Array, knots: Array, degree: int) -> list[Array]:
-    point = x[:, None]
-    values = ((point >= knots[:-1]) & (point < knots[1:])).astype(np.float64)
+    """B-splines of degree 0 to `degree`."""
+    distances = x - knots[:, None]
+    values = ((distances[:-1] >= 0.0) & (distances[1:] < 0.0)).astype(np.float64)
     orders = [values]
     for order in range(1, degree + 1):
-        inverse = 1.0 / (knots[order:] - knots[:-order])
-        rising = (point - knots[: -order - 1]) * inverse[:-1]
-        falling = (knots[order + 1 :] - point) * inverse[1:]
-        values = rising * values[:, :-1] + falling * values[:, 1:]
+        ratios = values / (knots[order:] - knots[:-order])[:, None]
+        values = distances[: -order - 1] * ratios[:-1] - distances[order + 1 :] * ratios[1:]
         orders.append(values)
     return orders

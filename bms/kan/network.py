@@ -38,7 +38,7 @@ class Edge:
         """phi(x) and whether x lies within the grid, both of shape (N,), for x of shape (N,)."""
         low, high = self.knots[degree], self.knots[-degree - 1]
         clamped = np.clip(x, low, high)
-        spline = basis(clamped, np.asarray(self.knots), degree) @ np.asarray(self.coefficients)
+        spline = np.asarray(self.coefficients) @ basis(clamped, np.asarray(self.knots), degree)
         phi = self.base_weight * silu(clamped) + self.spline_weight * spline
         return phi, (x >= low) & (x <= high)
 

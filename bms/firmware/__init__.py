@@ -1,0 +1,6 @@
+"""The C firmware behind cffi: the estimator, the controller and the whole ECU."""
+
+from bms.firmware.controller import CompiledNetwork, Estimate, Firmware
+from bms.firmware.ecu import Ecu
+
+__all__ = ["CompiledNetwork", "Ecu", "Estimate", "Firmware"]

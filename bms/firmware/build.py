@@ -1,0 +1,95 @@
+"""Builds bms.firmware._firmware: the C core of firmware_c/ behind cffi (API mode).
+
+The declarations are read from the headers themselves, so that binding and firmware cannot differ.
+Run by setuptools on installation; `python -m bms.firmware.build --help` builds variants.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+
+from cffi import FFI
+
+ROOT = Path(__file__).resolve().parents[2]
+FIRMWARE = Path("firmware_c")
+MODULE = "bms.firmware._firmware"
+HEADERS = ("kan", "rcbf", "calibration", "can_frame", "codec", "e2e", "monitor", "soc", "bms")
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
+SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+
+# What a host needs beyond the firmware: constants by address, and estimates by the thousand.
+_HOST_DECLARATIONS = """
+const bms_calibration_t *host_default_calibration(void);
+const fault_policy_t *host_fault_policies(void);
+void host_estimate_rows(const kan_model_t *model, const float *inputs, uint32_t rows,
+                        float *core_temperature_K, uint8_t *in_domain);
+"""
+_HOST_SOURCE = """
+#include "bms.h"
+
+static const bms_calibration_t *host_default_calibration(void)
+{
+    return &BMS_DEFAULT_CALIBRATION;
+}
+
+static const fault_policy_t *host_fault_policies(void)
+{
+    return MONITOR_POLICY;
+}
+
+static void host_estimate_rows(const kan_model_t *model, const float *inputs, uint32_t rows,
+                               float *core_temperature_K, uint8_t *in_domain)
+{
+    for (uint32_t i = 0u; i < rows; i++) {
+        const kan_estimate_t estimate = kan_evaluate(model, &inputs[i * model->width[0]]);
+        core_temperature_K[i] = estimate.core_temperature_K;
+        in_domain[i] = estimate.in_domain ? 1u : 0u;
+    }
+}
+"""
+
+
+def declarations(header: Path) -> str:
+    """What cffi needs of a header: no comments, preprocessor lines or constant objects."""
+    text = re.sub(r"/\*.*?\*/", "", header.read_text(encoding="utf-8"), flags=re.DOTALL)
+    lines = (line for line in text.splitlines() if not re.match(r"extern|#(?!define \w+ \d)", line))
+    return "\n".join(lines)
+
+
+def make_builder(flags: tuple[str, ...] = FLAGS) -> FFI:
+    """Builder of the extension; source paths are relative to the root of the repository."""
+    builder = FFI()
+    include = ROOT / FIRMWARE / "include"
+    builder.cdef("\n".join(declarations(include / f"{name}.h") for name in HEADERS))
+    builder.cdef(_HOST_DECLARATIONS)
+    folders = [FIRMWARE / "src", FIRMWARE / "generated"]
+    sources = [
+        str(path.relative_to(ROOT)) for folder in folders for path in (ROOT / folder).glob("*.c")
+    ]
+    builder.set_source(
+        MODULE,
+        _HOST_SOURCE,
+        sources=sorted(sources),
+        include_dirs=[str(FIRMWARE / "include"), *map(str, folders)],
+        extra_compile_args=list(flags),
+        extra_link_args=[flag for flag in flags if flag.startswith("-fsanitize")],
+    )
+    return builder
+
+
+def main() -> None:
+    """Build a variant of the extension into a folder, beside the installed one."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--out", type=Path, required=True, help="folder for the extension")
+    parser.add_argument("--sanitize", action="store_true", help="address and undefined behaviour")
+    arguments = parser.parse_args()
+    flags = (*FLAGS, *SANITIZERS) if arguments.sanitize else FLAGS
+    print(make_builder(flags).compile(tmpdir=str(arguments.out), verbose=False))
+
+
+if __name__ == "__main__":
+    main()
+else:
+    ffibuilder = make_builder()

@@ -1,0 +1,158 @@
+"""Estimator and controller of the firmware as Python calls."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bms.barrier import sampling_margins
+from bms.decision import ACTIVE_CONSTRAINTS, ConstraintMargins, Decision
+from bms.firmware._firmware import ffi, lib
+from bms.firmware.calibration import calibration_block, load_pair
+from bms.kan.model_file import KanModel
+from bms.presets import Preset
+from bms.tables import network_tables
+
+
+class Estimate(NamedTuple):
+    """Core temperature in K, and whether all inputs lie in the trained domain."""
+
+    core_temperature_K: float
+    in_domain: bool
+
+
+class CompiledNetwork:
+    """A trained network evaluated by the C code in float32."""
+
+    def __init__(self, model: KanModel) -> None:
+        """Raises InputError when the network exceeds the firmware's maxima."""
+        tables = network_tables(model.network)
+        self._model = ffi.new("kan_model_t *", tables.fields(model.network))
+        self._inputs = len(model.network.input_names)
+
+    def evaluate(
+        self, inputs: npt.ArrayLike
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+        """Core temperature in K and domain flag, both (N,), for inputs (N, n_in)."""
+        rows = np.ascontiguousarray(inputs, dtype=np.float32)
+        if rows.ndim != 2 or rows.shape[1] != self._inputs:
+            raise ValueError(f"inputs must have shape (N, {self._inputs})")
+        core, in_domain = np.empty(len(rows), np.float32), np.empty(len(rows), np.uint8)
+        lib.host_estimate_rows(
+            self._model,
+            ffi.from_buffer("float[]", rows),
+            len(rows),
+            ffi.from_buffer("float[]", core, require_writable=True),
+            ffi.from_buffer("uint8_t[]", in_domain, require_writable=True),
+        )
+        return core.astype(np.float64), in_domain.astype(np.bool_)
+
+
+class Firmware:
+    """Estimator and controller of one preset, as the firmware computes them.
+
+    `model` is the path of a model file; None means the model that ships with the preset, which for
+    the default preset is the compiled-in one. Raises InputError for unknown or unusable files and
+    ModelMismatchError for a model that was trained for something else.
+    """
+
+    def __init__(
+        self, preset: str | Path | Preset, model: str | Path | KanModel | None = None
+    ) -> None:
+        self.preset, self.model = load_pair(preset, model)
+        self._calibration = calibration_block(self.preset, self.model, compiled_in=model is None)
+        self._input = ffi.new("rcbf_input_t *")
+        self._estimator_inputs = ffi.new("float[4]")
+
+    def estimate(
+        self,
+        *,
+        current_A: float,
+        cooling_power_W: float,
+        surface_temperature_K: float,
+        coolant_temperature_K: float,
+    ) -> Estimate:
+        """Core temperature estimate for one set of measurements."""
+        inputs = self._estimator_inputs
+        inputs[0], inputs[1] = current_A, cooling_power_W
+        inputs[2], inputs[3] = surface_temperature_K, coolant_temperature_K
+        estimate = lib.kan_evaluate(ffi.addressof(self._calibration.kan), inputs)
+        return Estimate(estimate.core_temperature_K, bool(estimate.in_domain))
+
+    def solve(
+        self,
+        *,
+        soc: float,
+        core_temperature_K: float,
+        surface_temperature_K: float,
+        coolant_temperature_K: float,
+        cooling_power_W: float,
+        reference_current_A: float,
+    ) -> Decision:
+        """Charging current that is nearest to the reference within all constraints.
+
+        The core temperature is the estimate; its error bound is in the constraints. Infeasible
+        states and inputs that are not finite give 0 A with `feasible` false.
+        """
+        problem = self._input
+        problem.soc, problem.cooling_power_W = soc, cooling_power_W
+        problem.core_temperature_K = core_temperature_K
+        problem.surface_temperature_K = surface_temperature_K
+        problem.coolant_temperature_K = coolant_temperature_K
+        problem.reference_current_A = reference_current_A
+        answer = lib.rcbf_solve(ffi.addressof(self._calibration.rcbf), problem)
+        return Decision(
+            current_A=answer.current_A,
+            feasible=bool(answer.feasible),
+            active_constraint=ACTIVE_CONSTRAINTS[answer.active],
+            lower_A=answer.lower_A,
+            upper_A=answer.upper_A,
+            margins=ConstraintMargins(*answer.margins),
+        )
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """The numbers in force, by name with unit; read-only."""
+        preset = self.preset
+        cell, limits, gains = preset.cell, preset.limits, preset.gains
+        bounds, margins = preset.uncertainty, sampling_margins(cell, preset)
+        return MappingProxyType(
+            {
+                "core_resistance_K_per_W": cell.core_resistance_K_per_W,
+                "core_heat_capacity_J_per_K": cell.core_heat_capacity_J_per_K,
+                "surface_resistance_K_per_W": cell.surface_resistance_K_per_W,
+                "surface_heat_capacity_J_per_K": cell.surface_heat_capacity_J_per_K,
+                "coolant_heat_capacity_J_per_K": cell.coolant_heat_capacity_J_per_K,
+                "ohmic_resistance_ohm": cell.ohmic_resistance_ohm,
+                "entropic_coefficient_V_per_K": cell.entropic_coefficient_V_per_K,
+                "capacity_Ah": cell.capacity_Ah,
+                "ocv_soc": cell.ocv.soc,
+                "ocv_V": cell.ocv.voltage_V,
+                "max_voltage_V": limits.max_voltage_V,
+                "max_soc": limits.max_soc,
+                "max_core_temperature_K": limits.max_core_temperature_K,
+                "max_surface_temperature_K": limits.max_surface_temperature_K,
+                "reference_current_A": limits.reference_current_A,
+                "completion_soc": limits.completion_soc,
+                "alpha1": gains.alpha1_per_s,
+                "alpha2": gains.core_gain_per_s(cell),
+                "alpha3": gains.alpha3_per_s2,
+                "alpha4": gains.alpha4_per_s,
+                "soc_uncertainty_per_s": bounds.soc_per_s,
+                "core_uncertainty_K_per_s": bounds.core_K_per_s,
+                "surface_uncertainty_K_per_s": bounds.surface_K_per_s,
+                "coolant_uncertainty_K_per_s": bounds.coolant_K_per_s,
+                "surface_uncertainty_rate_K_per_s2": bounds.surface_rate_K_per_s2,
+                "estimation_error_bound_K": self.model.error_bound_K,
+                "sampling_period_s": preset.timing.sampling_period_s,
+                "voltage_margin_V": margins.voltage_V,
+                "soc_margin_per_s": margins.soc_per_s,
+                "core_margin_K_per_s": margins.core_K_per_s,
+                "surface_margin_K_per_s2": margins.surface_K_per_s2,
+            }
+        )

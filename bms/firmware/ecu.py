@@ -1,0 +1,45 @@
+"""The whole ECU application of the firmware: frames in, steps, frames out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bms.firmware._firmware import ffi, lib
+from bms.firmware.calibration import calibration_block, load_pair
+from bms.kan.model_file import KanModel
+from bms.presets import Preset
+
+MAX_DATA_LENGTH = 8
+
+
+class Ecu:
+    """One ECU with its own state. `preset` and `model` as in Firmware, with the same errors."""
+
+    def __init__(
+        self, preset: str | Path | Preset, model: str | Path | KanModel | None = None
+    ) -> None:
+        self.preset, self.model = load_pair(preset, model)
+        self._calibration = calibration_block(self.preset, self.model, compiled_in=model is None)
+        self._state = ffi.new("bms_t *")
+        self._frame = ffi.new("can_frame_t *")
+        config = ffi.new("bms_config_t *", {"calibration": self._calibration})
+        lib.bms_init(self._state, config)
+
+    def receive(self, frame_id: int, data: bytes) -> None:
+        """Take any frame with an 11-bit or 29-bit identifier and up to 8 data bytes."""
+        frame = self._frame
+        frame.id, frame.length = frame_id, min(len(data), MAX_DATA_LENGTH + 1)
+        ffi.memmove(frame.data, data, min(len(data), MAX_DATA_LENGTH))
+        lib.bms_receive(self._state, frame)
+
+    def step(self) -> None:
+        """Run one control period; messages that did not come since the last one are missing."""
+        lib.bms_step(self._state)
+
+    def transmit(self) -> list[tuple[int, bytes]]:
+        """Identifier and data of the frames of this period; the charge command is the last."""
+        frames = []
+        frame = self._frame
+        while lib.bms_transmit(self._state, frame):
+            frames.append((frame.id, bytes(ffi.buffer(frame.data, frame.length))))
+        return frames

@@ -1,0 +1,116 @@
+"""The firmware's calibration block: every number that depends on a preset or a model.
+
+The fields carry the names of bms_calibration_t, so that one mapping fills the structure at run
+time and is printed as a C initialiser by codegen.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bms.barrier import barrier_constants, sampling_margins
+from bms.errors import InputError, ModelMismatchError
+from bms.tables.network_tables import network_tables
+from bms.kan.model_file import KanModel
+from bms.kan.network import INPUT_NAMES
+from bms.presets import Preset
+
+LAYOUT = 1
+"""Layout number of bms_calibration_t that this module fills (BMS_CALIBRATION_LAYOUT)."""
+MAX_OCV_POINTS = 64
+
+_SENSOR_RANGES = {
+    "surface_temperature_K": (223.0, 373.0),
+    "coolant_temperature_K": (223.0, 373.0),
+    "cooling_power_W": (-1.0, 40.0),
+}
+_CURRENT_RANGE_FACTOR = 1.5
+_LOWEST_VOLTAGE_V, _VOLTAGE_HEADROOM_V = 1.5, 0.6
+_DEVIATIONS = {
+    "current_deviation_A": 1.0,
+    "voltage_deviation_V": 0.2,
+    "voltage_overshoot_V": 0.05,
+    "temperature_overshoot_K": 2.0,
+}
+
+
+def check_pair(preset: Preset, model: KanModel) -> None:
+    """Raise ModelMismatchError when the model was trained for another cell or box."""
+    if tuple(model.network.input_names) != INPUT_NAMES:
+        raise ModelMismatchError(
+            f"model with inputs {list(model.network.input_names)}: the firmware has "
+            f"{list(INPUT_NAMES)}"
+        )
+    if model.training_hash is not None and model.training_hash != preset.training_hash:
+        raise ModelMismatchError(
+            f"model {model.hash[:8]} was trained for preset '{model.preset}' with other cell, "
+            f"uncertainty or box than preset '{preset.name}' has; train it again with "
+            f"'bms train --preset {preset.name} --out model.json'"
+        )
+
+
+def calibration_fields(preset: Preset, model: KanModel) -> dict[str, Any]:
+    """Content of bms_calibration_t as nested mapping, lists and numbers.
+
+    Raises ModelMismatchError for a stale pair and InputError for what does not fit the maxima.
+    """
+    check_pair(preset, model)
+    if len(preset.cell.ocv.soc) > MAX_OCV_POINTS:
+        raise InputError(f"preset '{preset.name}': cell.ocv: at most {MAX_OCV_POINTS} points")
+    return {
+        "layout": LAYOUT,
+        "model_hash": int(model.hash[:8], 16),
+        "preset_hash": int(preset.hash[:8], 16),
+        "sampling_period_s": preset.timing.sampling_period_s,
+        "reference_current_A": preset.limits.reference_current_A,
+        "completion_soc": preset.limits.completion_soc,
+        "rcbf": _barrier_fields(preset, model.error_bound_K),
+        "plausibility": _plausibility_fields(preset),
+        "kan": network_tables(model.network).fields(model.network),
+    }
+
+
+def _barrier_fields(preset: Preset, error_bound_K: float) -> dict[str, Any]:
+    cell, limits, gains = preset.cell, preset.limits, preset.gains
+    constants = barrier_constants(cell, preset)
+    margins = sampling_margins(cell, preset)
+    return {
+        "capacity_As": cell.capacity_As,
+        "ohmic_resistance_ohm": cell.ohmic_resistance_ohm,
+        "max_voltage_V": limits.max_voltage_V,
+        "max_soc": limits.max_soc,
+        "max_core_temperature_K": limits.max_core_temperature_K,
+        "max_surface_temperature_K": limits.max_surface_temperature_K,
+        "alpha1_per_s": gains.alpha1_per_s,
+        "alpha2_per_s": gains.core_gain_per_s(cell),
+        "alpha3_per_s2": gains.alpha3_per_s2,
+        "a1_per_s": constants.a1_per_s,
+        "a2_per_As": constants.a2_per_As,
+        "a3_K_per_A2s": constants.a3_K_per_A2s,
+        "a4_per_s2": constants.a4_per_s2,
+        "a6_per_s2": constants.a6_per_s2,
+        "a8_per_As2": constants.a8_per_As2,
+        "a9_K_per_A2s2": constants.a9_K_per_A2s2,
+        "a10_K_per_Ws2": constants.a10_K_per_Ws2,
+        "delta4_K_per_s2": constants.delta4_K_per_s2,
+        "soc_uncertainty_per_s": preset.uncertainty.soc_per_s,
+        "core_uncertainty_K_per_s": preset.uncertainty.core_K_per_s,
+        "estimation_error_bound_K": error_bound_K,
+        "voltage_margin_V": margins.voltage_V,
+        "soc_margin_per_s": margins.soc_per_s,
+        "core_margin_K_per_s": margins.core_K_per_s,
+        "surface_margin_K_per_s2": margins.surface_K_per_s2,
+        "ocv_points": len(cell.ocv.soc),
+        "ocv_soc": list(cell.ocv.soc),
+        "ocv_V": list(cell.ocv.voltage_V),
+    }
+
+
+def _plausibility_fields(preset: Preset) -> dict[str, Any]:
+    strongest_A = -_CURRENT_RANGE_FACTOR * preset.limits.reference_current_A
+    ranges = {
+        "current_A": (-strongest_A, strongest_A),
+        "voltage_V": (_LOWEST_VOLTAGE_V, preset.limits.max_voltage_V + _VOLTAGE_HEADROOM_V),
+        **_SENSOR_RANGES,
+    }
+    return {name: {"low": low, "high": high} for name, (low, high) in ranges.items()} | _DEVIATIONS

@@ -1,0 +1,139 @@
+"""Edge functions as polynomial tables, the form in which the firmware evaluates the network.
+
+Each grid cell of an edge becomes one polynomial of fixed degree in the distance from the cell's
+middle. The spline part is reproduced exactly; the base function silu is interpolated at Chebyshev
+nodes, so that the firmware needs no exponential. Cells are halved until the error is small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial import Chebyshev, Polynomial
+
+from bms.errors import InputError
+from bms.kan.network import Edge, Network
+
+Array = npt.NDArray[np.float64]
+
+MAX_LAYERS, MAX_WIDTH, MAX_KNOTS, MAX_COEFFICIENTS = 3, 8, 192, 512
+"""The firmware's compile-time maxima (firmware_c/include/kan.h)."""
+CELL_COEFFICIENTS = 8
+TABLE_ERROR_K = 1e-5
+"""Cells are halved until the bound on the table's error is below this, or the tables are full."""
+
+
+@dataclass(frozen=True)
+class EdgeTable:
+    """Polynomials of one edge: knots (cells + 1,), coefficients (cells, 8) constant term first."""
+
+    knots: Array
+    coefficients: Array
+    worst_error: float
+    steepest: float
+
+
+@dataclass(frozen=True)
+class NetworkTables:
+    """All edges in the firmware's order: layer by layer, output by output, input by input."""
+
+    width: tuple[int, ...]
+    cells: int
+    edges: tuple[EdgeTable, ...]
+    error_bound_K: float
+
+    def fields(self, network: Network) -> dict[str, Any]:
+        """Content of the firmware's kan_model_t."""
+        return {
+            "layers": len(self.width) - 1,
+            "cells": self.cells,
+            "width": list(self.width),
+            "input_center": list(network.input_center),
+            "input_scale": [1.0 / half for half in network.input_half_range],
+            "output_center_K": network.output_center_K,
+            "output_half_range_K": network.output_half_range_K,
+            "knots": np.concatenate([edge.knots for edge in self.edges]).tolist(),
+            "coefficients": np.concatenate([e.coefficients.ravel() for e in self.edges]).tolist(),
+        }
+
+
+def network_tables(network: Network) -> NetworkTables:
+    """Tables of a network; InputError names the maximum that it does not fit."""
+    degree = network.degree
+    if degree >= CELL_COEFFICIENTS:
+        raise InputError(f"network: degree {degree} exceeds the firmware's {CELL_COEFFICIENTS - 1}")
+    edges = [edge for layer in network.layers for row in layer for edge in row]
+    grid = max(len(edge.knots) - 1 - 2 * degree for edge in edges)
+    tables = _build(network, edges, grid, 1)
+    halvings = 1
+    while tables.error_bound_K > TABLE_ERROR_K and _fits(network, len(edges), grid * halvings * 2):
+        halvings *= 2
+        tables = _build(network, edges, grid, halvings)
+    if not _fits(network, len(edges), tables.cells):
+        raise InputError(
+            f"network of width {list(network.width)} and {grid} grid cells: exceeds the firmware's "
+            f"maxima ({MAX_LAYERS} layers of {MAX_WIDTH}, {MAX_COEFFICIENTS} coefficients); "
+            "train a smaller one"
+        )
+    return tables
+
+
+def _fits(network: Network, edges: int, cells: int) -> bool:
+    return (
+        len(network.layers) <= MAX_LAYERS
+        and max(network.width) <= MAX_WIDTH
+        and edges * (cells + 1) <= MAX_KNOTS
+        and edges * cells * CELL_COEFFICIENTS <= MAX_COEFFICIENTS
+    )
+
+
+def _build(network: Network, edges: list[Edge], grid: int, halvings: int) -> NetworkTables:
+    tables = tuple(_edge_table(edge, network.degree, grid, halvings) for edge in edges)
+    return NetworkTables(
+        network.width, grid * halvings, tables, _error_bound_K(network, list(tables))
+    )
+
+
+def _edge_table(edge: Edge, degree: int, grid: int, halvings: int) -> EdgeTable:
+    own = np.asarray(edge.knots[degree : len(edge.knots) - degree])
+    per_cell = grid * halvings // (len(own) - 1)
+    extra = grid * halvings - per_cell * (len(own) - 1)
+    pieces = [
+        np.linspace(low, high, per_cell + (1 if i < extra else 0) + 1)[:-1]
+        for i, (low, high) in enumerate(zip(own[:-1], own[1:]))
+    ]
+    knots = np.append(np.concatenate(pieces), own[-1]).astype(np.float32).astype(np.float64)
+    coefficients, worst, steepest = [], 0.0, 0.0
+    for low, high in zip(knots[:-1], knots[1:]):
+        chebyshev = Chebyshev.interpolate(
+            lambda x: edge.evaluate(x, degree)[0], CELL_COEFFICIENTS - 1, [low, high]
+        )
+        middle = 0.5 * (low + high)
+        shifted = chebyshev.convert(kind=Polynomial)(Polynomial([middle, 1.0]))
+        padded = np.zeros(CELL_COEFFICIENTS)
+        padded[: len(shifted.coef)] = shifted.coef
+        coefficients.append(padded)
+        probe = np.linspace(low, high, 257)
+        error = Polynomial(padded)(probe - middle) - edge.evaluate(probe, degree)[0]
+        worst = max(worst, float(np.max(np.abs(error))))
+        steepest = max(steepest, float(np.max(np.abs(shifted.deriv()(probe - middle)))))
+    return EdgeTable(knots, np.asarray(coefficients), worst, steepest)
+
+
+def _error_bound_K(network: Network, tables: list[EdgeTable]) -> float:
+    """Bound on the table's error in K: edge errors add up and are amplified by later slopes."""
+    errors = [0.0] * len(network.input_names)
+    position = 0
+    for layer in network.layers:
+        following = []
+        for row in layer:
+            own = tables[position : position + len(row)]
+            position += len(row)
+            following.append(
+                sum(edge.worst_error + edge.steepest * e for edge, e in zip(own, errors))
+            )
+        errors = following
+    return network.output_half_range_K * errors[0]

@@ -1,0 +1,30 @@
+"""C source of the calibration block: constants of a preset and tables of a model."""
+
+from __future__ import annotations
+
+from bms.tables import calibration_fields, network_tables
+from bms.kan.model_file import KanModel
+from bms.presets import Preset
+from codegen.rendering import environment, initialiser
+
+FILE_NAME = "calibration_default.c"
+
+
+def calibration_source(preset: Preset, model: KanModel) -> dict[str, str]:
+    """File name -> text; ModelMismatchError for a stale pair of preset and model."""
+    tables = network_tables(model.network)
+    text = (
+        environment()
+        .get_template("calibration.c.j2")
+        .render(
+            preset=preset,
+            model=model,
+            table_error_K=f"{tables.error_bound_K:.1e}",
+            edge_errors_K=[
+                f"{edge.worst_error * model.network.output_half_range_K:.1e}"
+                for edge in tables.edges
+            ],
+            initialiser=initialiser(calibration_fields(preset, model)),
+        )
+    )
+    return {FILE_NAME: text}

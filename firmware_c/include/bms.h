@@ -1,0 +1,76 @@
+/* The ECU application: frames in, one step for each control period, frames out.
+ *
+ * There is no clock: time advances by one sampling period with every bms_step. All state is in a
+ * bms_t of the caller.
+ */
+#ifndef BMS_H
+#define BMS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "calibration.h"
+#include "can_frame.h"
+#include "codec.h"
+#include "e2e.h"
+#include "kan.h"
+#include "monitor.h"
+#include "rcbf.h"
+#include "soc.h"
+
+#define BMS_FIRMWARE_VERSION 1
+#define BMS_RECEIVED_MESSAGES 4
+#define BMS_TRANSMITTED_MESSAGES 6
+
+typedef enum {
+    BMS_INIT = 0,
+    BMS_STANDBY = 1,
+    BMS_CHARGING = 2,
+    BMS_DERATED = 3,
+    BMS_COMPLETE = 4,
+    BMS_FAULT = 5
+} bms_state_t;
+
+typedef struct {
+    const bms_calibration_t *calibration; /* must outlive the bms_t */
+} bms_config_t;
+
+typedef struct {
+    e2e_receiver_t e2e;
+    bool fresh; /* a valid frame came since the last step */
+    bool seen;
+} bms_inbox_t;
+
+typedef struct {
+    const bms_calibration_t *calibration;
+    bms_state_t state;
+    uint32_t periods;
+    codec_measurement_t measurement;
+    bms_inbox_t inbox[BMS_RECEIVED_MESSAGES];
+    bool corrupted; /* a frame failed its end-to-end check since the last step */
+    bool may_start; /* the request has been off since start-up or the last charge */
+    soc_t soc;
+    bool soc_known;
+    monitor_t monitor;
+    kan_estimate_t estimate;
+    rcbf_decision_t decision;
+    float command_A;
+    uint8_t counters[BMS_TRANSMITTED_MESSAGES];
+    can_frame_t outbox[BMS_TRANSMITTED_MESSAGES];
+    uint32_t outbox_length;
+    uint32_t outbox_next;
+} bms_t;
+
+/* A missing or invalid calibration leads to the fault state, for good. */
+void bms_init(bms_t *bms, const bms_config_t *config);
+
+/* Takes any frame; foreign ones are ignored. */
+void bms_receive(bms_t *bms, const can_frame_t *frame);
+
+/* Runs one control period and replaces what is waiting to be sent. */
+void bms_step(bms_t *bms);
+
+/* Pops the next frame to send; the charge command is the last one of a period. */
+bool bms_transmit(bms_t *bms, can_frame_t *frame);
+
+#endif

@@ -1,0 +1,87 @@
+/* Robust control-barrier quadratic program of one variable, solved in closed form.
+ *
+ * minimise (u - reference)^2 over reference <= u <= 0 and four constraints that are concave in u
+ * (docs/theory.md). Each admits an interval; the optimum is the end of their intersection that is
+ * nearest to the reference. Charging currents are negative.
+ */
+#ifndef RCBF_H
+#define RCBF_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define RCBF_MAX_OCV_POINTS 64
+#define RCBF_CONSTRAINTS 4
+
+/* Coefficients a1..a10 and delta4 as in bms/barrier/constants.py, computed offline in double. */
+typedef struct {
+    float capacity_As;
+    float ohmic_resistance_ohm;
+    float max_voltage_V;
+    float max_soc;
+    float max_core_temperature_K;
+    float max_surface_temperature_K;
+    float alpha1_per_s;
+    float alpha2_per_s;
+    float alpha3_per_s2;
+    float a1_per_s;
+    float a2_per_As;
+    float a3_K_per_A2s;
+    float a4_per_s2;
+    float a6_per_s2;
+    float a8_per_As2;
+    float a9_K_per_A2s2;
+    float a10_K_per_Ws2;
+    float delta4_K_per_s2;
+    float soc_uncertainty_per_s;
+    float core_uncertainty_K_per_s;
+    float estimation_error_bound_K;
+    float voltage_margin_V;
+    float soc_margin_per_s;
+    float core_margin_K_per_s;
+    float surface_margin_K_per_s2;
+    uint32_t ocv_points;
+    float ocv_soc[RCBF_MAX_OCV_POINTS];
+    float ocv_V[RCBF_MAX_OCV_POINTS];
+} rcbf_constants_t;
+
+typedef struct {
+    float soc;
+    float core_temperature_K; /* the estimate */
+    float surface_temperature_K;
+    float coolant_temperature_K;
+    float cooling_power_W;
+    float reference_current_A;
+} rcbf_input_t;
+
+typedef enum {
+    RCBF_NONE = 0,
+    RCBF_VOLTAGE = 1,
+    RCBF_SOC = 2,
+    RCBF_CORE = 3,
+    RCBF_SURFACE = 4,
+    RCBF_INFEASIBLE = 5,
+    RCBF_INVALID = 6
+} rcbf_active_t;
+
+typedef struct {
+    float current_A;
+    bool feasible;
+    rcbf_active_t active;
+    float lower_A;
+    float upper_A;
+    float margins[RCBF_CONSTRAINTS]; /* left-hand sides at current_A: voltage, soc, core, surface */
+} rcbf_decision_t;
+
+/* True when all constants are finite, those that must be positive are, and the table rises. */
+bool rcbf_constants_are_valid(const rcbf_constants_t *constants);
+
+/* Open-circuit voltage in V, linear between table points, constant beyond them. */
+float rcbf_open_circuit_voltage_V(const rcbf_constants_t *constants, float soc);
+
+/* Charging current. 0 A with feasible == false when no current satisfies all constraints
+ * (RCBF_INFEASIBLE) or an input is not finite, out of any physical range, or the reference is
+ * above 0 A (RCBF_INVALID). */
+rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t *input);
+
+#endif

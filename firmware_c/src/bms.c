@@ -1,0 +1,301 @@
+#include "bms.h"
+
+#include <math.h>
+#include <stddef.h>
+
+#include "can_catalog.h"
+#include "numeric.h"
+
+/* Periods that the other nodes have to come up before their silence is a fault. */
+#define START_UP_PERIODS 50u
+#define IDENTITY_EVERY_PERIODS 10u
+/* Counter steps of a message that may be skipped before its sequence counts as broken. */
+#define MAX_COUNTER_JUMP 3u
+/* A command this much weaker than the reference is called derated. */
+#define DERATED_A 0.01f
+
+typedef char received_messages_agree[(BMS_RECEIVED_MESSAGES == CAN_RECEIVED_COUNT) ? 1 : -1];
+typedef char transmitted_messages_agree[(BMS_TRANSMITTED_MESSAGES == CAN_TRANSMITTED_COUNT) ? 1
+                                                                                           : -1];
+typedef char faults_fit_into_their_signal[(FAULT_COUNT <= 20) ? 1 : -1];
+
+static const rcbf_decision_t NO_DECISION = {
+    0.0f, false, RCBF_INVALID, NAN, NAN, { NAN, NAN, NAN, NAN }
+};
+
+static uint32_t bit_if(bool condition, fault_t fault)
+{
+    return condition ? ((uint32_t)1u << (uint32_t)fault) : 0u;
+}
+
+static bool is_outside(float value, const range_t *range)
+{
+    return !((value >= range->low) && (value <= range->high));
+}
+
+static bool is_charging(const bms_t *bms)
+{
+    return (bms->state == BMS_CHARGING) || (bms->state == BMS_DERATED);
+}
+
+static bool is_fresh(const bms_t *bms, uint32_t message)
+{
+    return bms->inbox[message].fresh;
+}
+
+void bms_init(bms_t *bms, const bms_config_t *config)
+{
+    *bms = (bms_t){ .state = BMS_INIT, .estimate = { NAN, false }, .decision = NO_DECISION };
+    monitor_reset(&bms->monitor);
+    if ((config != NULL) && (config->calibration != NULL) &&
+        calibration_is_valid(config->calibration)) {
+        bms->calibration = config->calibration;
+    }
+}
+
+void bms_receive(bms_t *bms, const can_frame_t *frame)
+{
+    for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
+        const codec_message_t *message = &CAN_RECEIVED[i];
+        if (frame->id != message->id) {
+            continue;
+        }
+        bms_inbox_t *inbox = &bms->inbox[i];
+        if (e2e_check(&inbox->e2e, frame->data, frame->length, message->length, message->data_ids,
+                      MAX_COUNTER_JUMP) == E2E_OK) {
+            codec_read(i, frame->data, &bms->measurement);
+            inbox->fresh = true;
+            inbox->seen = true;
+        } else {
+            bms->corrupted = true;
+        }
+    }
+}
+
+static uint32_t symptoms_of_missing_messages(const bms_t *bms)
+{
+    static const fault_t MISSING[CAN_RECEIVED_COUNT] = {
+        [CAN_RECEIVED_CELL_ELECTRICAL] = FAULT_ELECTRICAL_MISSING,
+        [CAN_RECEIVED_CELL_THERMAL] = FAULT_THERMAL_MISSING,
+        [CAN_RECEIVED_COOLANT] = FAULT_COOLANT_MISSING,
+        [CAN_RECEIVED_CHARGE_REQUEST] = FAULT_REQUEST_MISSING,
+    };
+    uint32_t symptoms = bit_if(bms->corrupted, FAULT_CORRUPTED_FRAMES);
+    for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
+        symptoms |= bit_if(!bms->inbox[i].fresh, MISSING[i]);
+    }
+    return symptoms;
+}
+
+static bool request_is_valid(const bms_t *bms)
+{
+    const codec_measurement_t *m = &bms->measurement;
+    const bool start_is_known =
+        (m->plug_in_soc >= 0.0f) && (m->plug_in_soc <= bms->calibration->rcbf.max_soc);
+    return (m->request == REQUEST_OFF) ||
+           ((m->request == REQUEST_CHARGE) && (m->reference_current_A <= 0.0f) && start_is_known);
+}
+
+static uint32_t symptoms_of_readings(const bms_t *bms)
+{
+    const codec_measurement_t *m = &bms->measurement;
+    const plausibility_t *limits = &bms->calibration->plausibility;
+    const rcbf_constants_t *cell = &bms->calibration->rcbf;
+    const bool electrical = is_fresh(bms, CAN_RECEIVED_CELL_ELECTRICAL);
+    const bool thermal = is_fresh(bms, CAN_RECEIVED_CELL_THERMAL);
+    const bool coolant = is_fresh(bms, CAN_RECEIVED_COOLANT);
+    const float model_V = rcbf_open_circuit_voltage_V(cell, bms->soc.soc) -
+                          m->current_A * cell->ohmic_resistance_ohm;
+    const float deviation_A = numeric_abs(m->current_A - bms->command_A);
+    const float deviation_V = numeric_abs(m->voltage_V - model_V);
+    const float core_limit_K = cell->max_core_temperature_K + cell->estimation_error_bound_K +
+                               limits->temperature_overshoot_K;
+    const float surface_limit_K =
+        cell->max_surface_temperature_K + limits->temperature_overshoot_K;
+
+    return bit_if(electrical && is_outside(m->current_A, &limits->current_A),
+                  FAULT_CURRENT_RANGE) |
+           bit_if(electrical && is_outside(m->voltage_V, &limits->voltage_V),
+                  FAULT_VOLTAGE_RANGE) |
+           bit_if(thermal && is_outside(m->surface_temperature_K, &limits->surface_temperature_K),
+                  FAULT_SURFACE_RANGE) |
+           bit_if(thermal && is_outside(m->coolant_temperature_K, &limits->coolant_temperature_K),
+                  FAULT_COOLANT_RANGE) |
+           bit_if(coolant && is_outside(m->cooling_power_W, &limits->cooling_power_W),
+                  FAULT_COOLING_RANGE) |
+           bit_if(is_fresh(bms, CAN_RECEIVED_CHARGE_REQUEST) && !request_is_valid(bms),
+                  FAULT_REQUEST_INVALID) |
+           bit_if(electrical && thermal && coolant && !bms->estimate.in_domain,
+                  FAULT_OUT_OF_DOMAIN) |
+           bit_if(electrical && (deviation_A > limits->current_deviation_A),
+                  FAULT_CURRENT_DEVIATION) |
+           bit_if(electrical && bms->soc_known && (deviation_V > limits->voltage_deviation_V),
+                  FAULT_VOLTAGE_DEVIATION) |
+           bit_if(electrical &&
+                      (m->voltage_V > cell->max_voltage_V + limits->voltage_overshoot_V),
+                  FAULT_OVER_VOLTAGE) |
+           bit_if(thermal && (bms->estimate.core_temperature_K > core_limit_K),
+                  FAULT_CORE_OVER_TEMPERATURE) |
+           bit_if(thermal && (m->surface_temperature_K > surface_limit_K),
+                  FAULT_SURFACE_OVER_TEMPERATURE);
+}
+
+static void update_estimates(bms_t *bms)
+{
+    const codec_measurement_t *m = &bms->measurement;
+    const bms_calibration_t *calibration = bms->calibration;
+    const float inputs[4] = { m->current_A, m->cooling_power_W, m->surface_temperature_K,
+                              m->coolant_temperature_K };
+    bms->estimate = kan_evaluate(&calibration->kan, inputs);
+    if (bms->soc_known) {
+        /* Without a usable reading the command is what has most likely flowed. */
+        const bool usable = is_fresh(bms, CAN_RECEIVED_CELL_ELECTRICAL) &&
+                            !is_outside(m->current_A, &calibration->plausibility.current_A);
+        soc_count(&bms->soc, usable ? m->current_A : bms->command_A,
+                  calibration->sampling_period_s, calibration->rcbf.capacity_As);
+    }
+}
+
+/* Follows the charge request; a charge begins only at an edge from off to charge, so that an ECU
+ * that restarts in mid-charge stays off until somebody tells it the state of charge. */
+static void follow_request(bms_t *bms, uint32_t symptoms)
+{
+    if (!is_fresh(bms, CAN_RECEIVED_CHARGE_REQUEST)) {
+        return;
+    }
+    if (bms->measurement.request == REQUEST_OFF) {
+        bms->may_start = true;
+        if ((bms->state == BMS_FAULT) && (symptoms == 0u)) {
+            monitor_reset(&bms->monitor);
+            bms->state = BMS_STANDBY;
+        } else if (bms->state != BMS_FAULT) {
+            bms->state = BMS_STANDBY;
+        }
+    } else if ((bms->state == BMS_STANDBY) && bms->may_start && (symptoms == 0u)) {
+        soc_set(&bms->soc, bms->measurement.plug_in_soc);
+        bms->soc_known = true;
+        bms->may_start = false;
+        bms->state = BMS_CHARGING;
+    }
+}
+
+static void decide(bms_t *bms)
+{
+    const codec_measurement_t *m = &bms->measurement;
+    const bms_calibration_t *calibration = bms->calibration;
+    bms->decision = NO_DECISION;
+    if (is_charging(bms) && (bms->soc.soc >= calibration->completion_soc)) {
+        bms->state = BMS_COMPLETE;
+    }
+    if (is_charging(bms)) {
+        const float strongest_A = calibration->reference_current_A;
+        const rcbf_input_t input = {
+            .soc = bms->soc.soc,
+            .core_temperature_K = bms->estimate.core_temperature_K,
+            .surface_temperature_K = m->surface_temperature_K,
+            .coolant_temperature_K = m->coolant_temperature_K,
+            .cooling_power_W = m->cooling_power_W,
+            .reference_current_A =
+                (m->reference_current_A < strongest_A) ? strongest_A : m->reference_current_A,
+        };
+        bms->decision = rcbf_solve(&calibration->rcbf, &input);
+        bms->state = (bms->decision.current_A > input.reference_current_A + DERATED_A)
+                         ? BMS_DERATED
+                         : BMS_CHARGING;
+    }
+}
+
+static void run_period(bms_t *bms)
+{
+    if (bms->state == BMS_INIT) {
+        bool all_seen = true;
+        for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
+            all_seen = all_seen && bms->inbox[i].seen;
+        }
+        if (!all_seen && (bms->periods < START_UP_PERIODS)) {
+            return;
+        }
+        bms->state = BMS_STANDBY;
+    }
+    update_estimates(bms);
+    uint32_t symptoms = symptoms_of_missing_messages(bms) | symptoms_of_readings(bms);
+    follow_request(bms, symptoms);
+    decide(bms);
+    symptoms |= bit_if(is_charging(bms) && (bms->decision.active == RCBF_INVALID),
+                       FAULT_DECISION_INVALID);
+    monitor_step(&bms->monitor, symptoms);
+    if (bms->monitor.latched != 0u) {
+        bms->state = BMS_FAULT;
+    }
+    const bool may_charge = is_charging(bms) && !bms->monitor.stop && bms->decision.feasible;
+    bms->command_A = may_charge ? bms->decision.current_A : 0.0f;
+}
+
+static void queue_frames(bms_t *bms)
+{
+    const codec_report_t report = {
+        .command_A = bms->command_A,
+        .state = (uint8_t)bms->state,
+        .core_temperature_K = bms->estimate.core_temperature_K,
+        .soc = bms->soc_known ? bms->soc.soc : NAN,
+        .error_bound_K = (bms->calibration != NULL)
+                             ? bms->calibration->rcbf.estimation_error_bound_K
+                             : NAN,
+        .in_domain = bms->estimate.in_domain ? 1u : 0u,
+        .active_constraint = (uint8_t)bms->decision.active,
+        .feasible = bms->decision.feasible ? 1u : 0u,
+        .lower_A = bms->decision.lower_A,
+        .upper_A = bms->decision.upper_A,
+        .margins = { bms->decision.margins[0], bms->decision.margins[1], bms->decision.margins[2],
+                     bms->decision.margins[3] },
+        .first_fault = bms->monitor.first,
+        .active_faults = bms->monitor.active,
+        .latched_faults = bms->monitor.latched,
+        .model_hash = (bms->calibration != NULL) ? bms->calibration->model_hash : 0u,
+        .preset_hash = (uint16_t)((bms->calibration != NULL)
+                                      ? (bms->calibration->preset_hash >> 16u)
+                                      : 0u),
+        .firmware_version = BMS_FIRMWARE_VERSION,
+    };
+    bms->outbox_length = 0u;
+    bms->outbox_next = 0u;
+    for (uint32_t i = 0u; i < CAN_TRANSMITTED_COUNT; i++) {
+        if ((i == CAN_TRANSMITTED_IDENTITY) && (bms->periods % IDENTITY_EVERY_PERIODS != 0u)) {
+            continue;
+        }
+        can_frame_t *frame = &bms->outbox[bms->outbox_length];
+        codec_write(i, &report, frame);
+        if (CAN_TRANSMITTED[i].is_protected) {
+            e2e_protect(frame->data, frame->length, CAN_TRANSMITTED[i].data_ids,
+                        bms->counters[i]);
+            bms->counters[i]++;
+        }
+        bms->outbox_length++;
+    }
+}
+
+void bms_step(bms_t *bms)
+{
+    if (bms->calibration != NULL) {
+        run_period(bms);
+    } else {
+        monitor_step(&bms->monitor, bit_if(true, FAULT_CALIBRATION));
+        bms->state = BMS_FAULT;
+    }
+    queue_frames(bms);
+    bms->periods++;
+    bms->corrupted = false;
+    for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
+        bms->inbox[i].fresh = false;
+    }
+}
+
+bool bms_transmit(bms_t *bms, can_frame_t *frame)
+{
+    if (bms->outbox_next >= bms->outbox_length) {
+        return false;
+    }
+    *frame = bms->outbox[bms->outbox_next];
+    bms->outbox_next++;
+    return true;
+}

@@ -1,0 +1,35 @@
+#include "calibration.h"
+
+#include "numeric.h"
+
+static bool range_is_valid(const range_t *range)
+{
+    return numeric_is_finite(range->low) && numeric_is_finite(range->high) &&
+           (range->low < range->high);
+}
+
+static bool is_positive(float value)
+{
+    return (value > 0.0f) && numeric_is_finite(value);
+}
+
+static bool plausibility_is_valid(const plausibility_t *limits)
+{
+    return range_is_valid(&limits->current_A) && range_is_valid(&limits->voltage_V) &&
+           range_is_valid(&limits->surface_temperature_K) &&
+           range_is_valid(&limits->coolant_temperature_K) &&
+           range_is_valid(&limits->cooling_power_W) && is_positive(limits->current_deviation_A) &&
+           is_positive(limits->voltage_deviation_V) && is_positive(limits->voltage_overshoot_V) &&
+           is_positive(limits->temperature_overshoot_K);
+}
+
+bool calibration_is_valid(const bms_calibration_t *calibration)
+{
+    return (calibration->layout == BMS_CALIBRATION_LAYOUT) &&
+           is_positive(calibration->sampling_period_s) &&
+           is_positive(-calibration->reference_current_A) &&
+           is_positive(calibration->completion_soc) &&
+           rcbf_constants_are_valid(&calibration->rcbf) &&
+           plausibility_is_valid(&calibration->plausibility) &&
+           (calibration->kan.width[0] == 4u) && kan_model_is_valid(&calibration->kan);
+}

@@ -1,0 +1,160 @@
+#include "codec.h"
+
+#include <math.h>
+
+#include "can_catalog.h"
+#include "can_db.h"
+#include "numeric.h"
+
+/* Share of a step by which float32 may miss a value that lies exactly on a step. */
+#define STEP_TOLERANCE 0.02f
+
+uint16_t codec_encode(const codec_signal_t *signal, float value, codec_rounding_t rounding)
+{
+    if (!numeric_is_finite(value)) {
+        return (uint16_t)(signal->raw_max + 2u);
+    }
+    float up = 0.5f;
+    if (rounding == CODEC_TOWARDS_ZERO) {
+        up = (value < 0.0f) ? (1.0f - STEP_TOLERANCE) : STEP_TOLERANCE;
+    }
+    const float steps = (value - signal->offset) / signal->scale + up;
+    return (uint16_t)numeric_clamp(steps, 0.0f, (float)signal->raw_max);
+}
+
+float codec_decode(const codec_signal_t *signal, uint16_t raw)
+{
+    return (raw > signal->raw_max) ? NAN : (signal->offset + signal->scale * (float)raw);
+}
+
+static float decode(uint32_t signal, uint16_t raw)
+{
+    return codec_decode(&CAN_SIGNALS[signal], raw);
+}
+
+static uint16_t encode(uint32_t signal, float value)
+{
+    return codec_encode(&CAN_SIGNALS[signal], value, CODEC_NEAREST);
+}
+
+void codec_read(uint32_t index, const uint8_t *data, codec_measurement_t *measurement)
+{
+    switch (index) {
+    case CAN_RECEIVED_CELL_ELECTRICAL: {
+        struct can_db_cell_electrical_t message;
+        (void)can_db_cell_electrical_unpack(&message, data, CAN_DB_CELL_ELECTRICAL_LENGTH);
+        measurement->current_A = decode(CAN_SIGNAL_CURRENT, message.current);
+        measurement->voltage_V = decode(CAN_SIGNAL_VOLTAGE, message.voltage);
+        break;
+    }
+    case CAN_RECEIVED_CELL_THERMAL: {
+        struct can_db_cell_thermal_t message;
+        (void)can_db_cell_thermal_unpack(&message, data, CAN_DB_CELL_THERMAL_LENGTH);
+        measurement->surface_temperature_K =
+            decode(CAN_SIGNAL_SURFACE_TEMPERATURE, message.surface_temperature);
+        measurement->coolant_temperature_K =
+            decode(CAN_SIGNAL_COOLANT_TEMPERATURE, message.coolant_temperature);
+        break;
+    }
+    case CAN_RECEIVED_COOLANT: {
+        struct can_db_coolant_t message;
+        (void)can_db_coolant_unpack(&message, data, CAN_DB_COOLANT_LENGTH);
+        measurement->cooling_power_W = decode(CAN_SIGNAL_COOLING_POWER, message.cooling_power);
+        break;
+    }
+    case CAN_RECEIVED_CHARGE_REQUEST: {
+        struct can_db_charge_request_t message;
+        (void)can_db_charge_request_unpack(&message, data, CAN_DB_CHARGE_REQUEST_LENGTH);
+        measurement->request = message.request;
+        measurement->reference_current_A =
+            decode(CAN_SIGNAL_REFERENCE_CURRENT, message.reference_current);
+        measurement->plug_in_soc =
+            decode(CAN_SIGNAL_PLUG_IN_STATE_OF_CHARGE, message.plug_in_state_of_charge);
+        break;
+    }
+    default:
+        break;
+    }
+}
+
+static void write_estimate(const codec_report_t *report, uint8_t *data)
+{
+    const struct can_db_estimate_t message = {
+        .core_temperature = encode(CAN_SIGNAL_CORE_TEMPERATURE, report->core_temperature_K),
+        .state_of_charge = encode(CAN_SIGNAL_STATE_OF_CHARGE, report->soc),
+        .error_bound = encode(CAN_SIGNAL_ERROR_BOUND, report->error_bound_K),
+        .in_domain = report->in_domain,
+    };
+    (void)can_db_estimate_pack(data, &message, CAN_DB_ESTIMATE_LENGTH);
+}
+
+static void write_decision(const codec_report_t *report, uint8_t *data)
+{
+    const struct can_db_decision_t message = {
+        .active_constraint = report->active_constraint,
+        .feasible = report->feasible,
+        .lower_current = encode(CAN_SIGNAL_LOWER_CURRENT, report->lower_A),
+        .upper_current = encode(CAN_SIGNAL_UPPER_CURRENT, report->upper_A),
+    };
+    (void)can_db_decision_pack(data, &message, CAN_DB_DECISION_LENGTH);
+}
+
+static void write_margins(const codec_report_t *report, uint8_t *data)
+{
+    const struct can_db_decision_margins_t message = {
+        .voltage_margin = encode(CAN_SIGNAL_VOLTAGE_MARGIN, report->margins[0]),
+        .soc_margin = encode(CAN_SIGNAL_SOC_MARGIN, report->margins[1]),
+        .core_margin = encode(CAN_SIGNAL_CORE_MARGIN, report->margins[2]),
+        .surface_margin = encode(CAN_SIGNAL_SURFACE_MARGIN, report->margins[3]),
+    };
+    (void)can_db_decision_margins_pack(data, &message, CAN_DB_DECISION_MARGINS_LENGTH);
+}
+
+static void write_diagnostics(const codec_report_t *report, uint8_t *data)
+{
+    const struct can_db_diagnostics_t message = {
+        .diagnostic_state = report->state,
+        .first_fault = report->first_fault,
+        .active_faults = report->active_faults,
+        .latched_faults = report->latched_faults,
+    };
+    (void)can_db_diagnostics_pack(data, &message, CAN_DB_DIAGNOSTICS_LENGTH);
+}
+
+static void write_identity(const codec_report_t *report, uint8_t *data)
+{
+    const struct can_db_identity_t message = {
+        .model_hash = report->model_hash,
+        .preset_hash = report->preset_hash,
+        .firmware_version = report->firmware_version,
+    };
+    (void)can_db_identity_pack(data, &message, CAN_DB_IDENTITY_LENGTH);
+}
+
+static void write_command(const codec_report_t *report, uint8_t *data)
+{
+    const struct can_db_charge_command_t message = {
+        .command_current = codec_encode(&CAN_SIGNALS[CAN_SIGNAL_COMMAND_CURRENT],
+                                        report->command_A, CODEC_TOWARDS_ZERO),
+        .command_state = report->state,
+    };
+    (void)can_db_charge_command_pack(data, &message, CAN_DB_CHARGE_COMMAND_LENGTH);
+}
+
+void codec_write(uint32_t index, const codec_report_t *report, can_frame_t *frame)
+{
+    static void (*const WRITE[CAN_TRANSMITTED_COUNT])(const codec_report_t *, uint8_t *) = {
+        [CAN_TRANSMITTED_ESTIMATE] = write_estimate,
+        [CAN_TRANSMITTED_DECISION] = write_decision,
+        [CAN_TRANSMITTED_DECISION_MARGINS] = write_margins,
+        [CAN_TRANSMITTED_DIAGNOSTICS] = write_diagnostics,
+        [CAN_TRANSMITTED_IDENTITY] = write_identity,
+        [CAN_TRANSMITTED_CHARGE_COMMAND] = write_command,
+    };
+    frame->id = CAN_TRANSMITTED[index].id;
+    frame->length = CAN_TRANSMITTED[index].length;
+    for (uint32_t i = 0u; i < sizeof frame->data; i++) {
+        frame->data[i] = 0u;
+    }
+    WRITE[index](report, frame->data);
+}

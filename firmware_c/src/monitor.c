@@ -1,0 +1,60 @@
+#include "monitor.h"
+
+/* Lost or unreadable data stops at once and is forgiven when it returns within the debounce time.
+ * Deviations need a few periods, because the charger answers one period after the command. */
+const fault_policy_t MONITOR_POLICY[FAULT_COUNT] = {
+    [FAULT_ELECTRICAL_MISSING] = { 3u, true },
+    [FAULT_THERMAL_MISSING] = { 3u, true },
+    [FAULT_COOLANT_MISSING] = { 3u, true },
+    [FAULT_REQUEST_MISSING] = { 3u, true },
+    [FAULT_CURRENT_RANGE] = { 3u, true },
+    [FAULT_VOLTAGE_RANGE] = { 3u, true },
+    [FAULT_SURFACE_RANGE] = { 3u, true },
+    [FAULT_COOLANT_RANGE] = { 3u, true },
+    [FAULT_COOLING_RANGE] = { 3u, true },
+    [FAULT_REQUEST_INVALID] = { 3u, true },
+    [FAULT_OUT_OF_DOMAIN] = { 5u, true },
+    [FAULT_CURRENT_DEVIATION] = { 3u, false },
+    [FAULT_VOLTAGE_DEVIATION] = { 5u, false },
+    [FAULT_OVER_VOLTAGE] = { 2u, true },
+    [FAULT_CORE_OVER_TEMPERATURE] = { 2u, true },
+    [FAULT_SURFACE_OVER_TEMPERATURE] = { 2u, true },
+    [FAULT_CORRUPTED_FRAMES] = { 3u, false },
+    [FAULT_DECISION_INVALID] = { 2u, true },
+    [FAULT_CALIBRATION] = { 1u, true },
+};
+
+void monitor_reset(monitor_t *monitor)
+{
+    for (uint32_t fault = 0u; fault < FAULT_COUNT; fault++) {
+        monitor->lasted[fault] = 0u;
+    }
+    monitor->active = 0u;
+    monitor->latched = 0u;
+    monitor->first = FAULT_NONE;
+    monitor->stop = false;
+}
+
+void monitor_step(monitor_t *monitor, uint32_t symptoms)
+{
+    monitor->active = symptoms;
+    monitor->stop = false;
+    for (uint32_t fault = 0u; fault < FAULT_COUNT; fault++) {
+        const fault_policy_t *policy = &MONITOR_POLICY[fault];
+        const uint32_t bit = (uint32_t)1u << fault;
+        if ((symptoms & bit) == 0u) {
+            monitor->lasted[fault] = 0u;
+            continue;
+        }
+        if (monitor->lasted[fault] < UINT8_MAX) {
+            monitor->lasted[fault]++;
+        }
+        monitor->stop = monitor->stop || policy->stops_at_once;
+        if (monitor->lasted[fault] >= policy->debounce_periods) {
+            if (monitor->latched == 0u) {
+                monitor->first = (uint8_t)fault;
+            }
+            monitor->latched |= bit;
+        }
+    }
+}

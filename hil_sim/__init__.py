@@ -1,0 +1,1 @@
+"""What surrounds the ECU: cell plant, sensors, charger, buses, nodes, recording, report."""

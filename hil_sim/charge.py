@@ -1,0 +1,137 @@
+"""One charge: plant, sensors and charger on one side of the bus, the ECU on the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bms.errors import BusError, ModelMismatchError
+from bms.presets import Preset
+from hil_sim.charger import Charger
+from hil_sim.nodes.plant import Answer, PlantNode, Request
+from hil_sim.plant import Plant
+from hil_sim.result import (
+    STOP_COMPLETE,
+    STOP_FAULT,
+    STOP_SILENT,
+    STOP_TIME_LIMIT,
+    TimeSeries,
+)
+from hil_sim.sensors import Readings, SensorSuite
+
+OFF_PERIODS = 5
+"""Periods with the request off before the charge, in which the ECU starts and gets ready."""
+READY_PERIODS = 100
+"""Periods after which an ECU that is not ready is given up."""
+SILENT_PERIODS = 5
+"""Periods without an intact command that end a run; the charger has stopped well before."""
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Identity:
+    """First digits of the hashes that the ECU reports, as hexadecimal text."""
+
+    model: str
+    preset: str
+
+
+@dataclass
+class Charge:
+    """A charge from plug-in until full, fault, silence or time limit."""
+
+    preset: Preset
+    node: PlantNode
+    plant: Plant
+    sensors: SensorSuite
+    charger: Charger
+    max_time_s: float
+    progress: Progress = lambda soc: None
+
+    def __post_init__(self) -> None:
+        self.series = TimeSeries()
+        self.steps = 0
+        self.identity: Identity | None = None
+        self.error_bound_K: float | None = None
+        self._edge: int | None = None
+        self._silent_periods = 0
+        self._plug_in_soc = self.plant.state.soc
+
+    def run(self) -> str:
+        """Run to the end and return why it ended.
+
+        Raises BusError when no ECU gets ready and ModelMismatchError when it has another preset.
+        """
+        while True:
+            answer = self.node.exchange(self.steps, self._measure(), self._request())
+            self.plant.current_A = self.charger.current_A(answer.command_A)
+            self._note(answer)
+            self.steps += 1
+            reason = self._stop_reason(answer)
+            if reason is not None:
+                return reason
+            self._prepare(answer)
+            self.plant.advance()
+            self.progress(self.plant.state.soc)
+
+    @property
+    def _period_s(self) -> float:
+        return self.preset.timing.sampling_period_s
+
+    def _measure(self) -> Readings:
+        plant = self.plant
+        return self.sensors.read(
+            Readings(
+                plant.current_A,
+                plant.voltage_V,
+                plant.state.surface_temperature_K,
+                plant.state.coolant_temperature_K,
+                plant.cooling_power_W,
+            )
+        )
+
+    def _request(self) -> Request:
+        reference_A = self.preset.limits.reference_current_A
+        return Request(self._edge is not None, reference_A, self._plug_in_soc)
+
+    def _prepare(self, answer: Answer) -> None:
+        """Switch the request on once the ECU is ready, not before OFF_PERIODS."""
+        if self._edge is not None or self.steps < OFF_PERIODS:
+            return
+        if answer.state == "standby":
+            self._edge = self.steps
+        elif self.steps >= READY_PERIODS:
+            raise BusError(
+                f"the ECU is not ready after {self.steps} periods (state: {answer.state or 'none'})"
+                "; see the fault bits of its Diagnostics message"
+            )
+
+    def _note(self, answer: Answer) -> None:
+        plant, begin = self.plant, self._edge if self._edge is not None else OFF_PERIODS
+        time_s = (self.steps - begin) * self._period_s
+        self.series.append(time_s, plant.state, plant.current_A, plant.voltage_V, answer)
+        self._silent_periods = 0 if answer.command_A is not None else self._silent_periods + 1
+        if self._edge is not None and answer.value("ErrorBound") is not None:
+            self.error_bound_K = answer.value("ErrorBound")
+        model, preset = answer.value("ModelHash"), answer.value("PresetHash")
+        if model is not None and preset is not None:
+            self.identity = Identity(f"{int(model):08x}", f"{int(preset):04x}")
+            if not self.preset.hash.startswith(self.identity.preset):
+                raise ModelMismatchError(
+                    f"the ECU runs a preset with hash {self.identity.preset}..., the plant "
+                    f"'{self.preset.name}' with {self.preset.hash[:4]}...; give both one preset"
+                )
+
+    def _stop_reason(self, answer: Answer) -> str | None:
+        if self._edge is None:
+            return None
+        if self._silent_periods >= SILENT_PERIODS:
+            return STOP_SILENT
+        if answer.state == "complete":
+            return STOP_COMPLETE
+        if answer.state == "fault":
+            return STOP_FAULT
+        if (self.steps - self._edge) * self._period_s >= self.max_time_s:
+            return STOP_TIME_LIMIT
+        return None

@@ -1,0 +1,1 @@
+"""Commands of `bms` that run the simulator."""

@@ -1,0 +1,64 @@
+"""`bms ecu`: the C firmware on a CAN bus, for a plant in another process."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from threading import Event
+from typing import Annotated
+
+import typer
+
+from bms.errors import InputError
+from bms.firmware import Ecu
+from bms.presets import DEFAULT_PRESET
+from hil_sim.bus import is_private, open_bus
+from hil_sim.clock import WallClock
+from hil_sim.nodes.ecu import EcuNode
+
+
+def ecu(
+    bus: Annotated[
+        str,
+        typer.Option("--bus", help="CAN bus as interface:channel, for example socketcan:vcan0."),
+    ],
+    preset: Annotated[
+        str, typer.Option("--preset", help="Name of a shipped preset, or path of a TOML file.")
+    ] = DEFAULT_PRESET,
+    model: Annotated[
+        Path | None,
+        typer.Option("--model", help="JSON model of the estimator.  [default: the preset's own]"),
+    ] = None,
+    realtime: Annotated[
+        bool,
+        typer.Option("--realtime", help="Step by the wall clock instead of on SYNC frames."),
+    ] = False,
+    silence_s: Annotated[
+        float,
+        typer.Option("--silence-s", min=0.1, help="End after this time in s without a frame."),
+    ] = 5.0,
+) -> int:
+    """Run the firmware on a CAN bus until the bus falls silent, or until Ctrl-C or SIGTERM.
+
+    Waits for the first frame as long as it takes.
+
+    Example: bms ecu --bus socketcan:vcan0 --silence-s 10
+    """
+    if is_private(bus):
+        raise InputError(
+            f"bus '{bus}': reaches parties in one process only; use 'bms sil', "
+            "or a bus such as socketcan:vcan0 for two processes"
+        )
+    firmware = Ecu(preset=preset, model=model)
+    stop = Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    with open_bus(bus) as connection:
+        node = EcuNode(connection, firmware)
+        if realtime:
+            period_s = firmware.preset.timing.sampling_period_s
+            node.run_on_clock(period_s, WallClock(), silence_s, stop.is_set)
+        else:
+            node.run(silence_s, stop.is_set)
+    print(f"ECU on {bus}: {node.frames} frames received, {node.steps} steps")
+    return 0

@@ -1,0 +1,50 @@
+"""`bms plant`: cell, sensors and charger on a CAN bus, for an ECU in another process."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from bms.presets import load_preset
+from hil_sim.commands import options
+from hil_sim.commands.outcome import charge_and_report
+from hil_sim.disturbances import DisturbanceKind
+from hil_sim.session import Settings, run_plant
+
+
+def plant(
+    bus: options.BusOption,
+    preset: options.PresetOption = options.DEFAULT_PRESET,
+    seed: options.SeedOption = 0,
+    disturbance: options.DisturbanceOption = DisturbanceKind.NONE,
+    out: options.OutOption = None,
+    json: options.JsonOption = False,
+    realtime: options.RealtimeOption = False,
+    max_time_s: options.MaxTimeOption = 3600.0,
+    answer_timeout_s: Annotated[
+        float,
+        typer.Option(
+            "--answer-timeout-s", min=0.01, help="Wait for the ECU in s before it counts as silent."
+        ),
+    ] = 1.0,
+) -> int:
+    """Charge a simulated cell with whatever ECU is on the bus, for example `bms ecu`.
+
+    Measurements, then SYNC start each control period, and the plant waits for the charge command;
+    with --realtime it sends no SYNC and waits for nobody. Temperatures in K, currents in A
+    (negative while charging), times in s from the start of the charge. Exit code 1 when a limit is
+    crossed or the charge fails.
+
+    Example: bms plant --bus socketcan:vcan0 --seed 1 --out out/run
+    """
+    settings = Settings(
+        preset=load_preset(preset),
+        bus=bus,
+        seed=seed,
+        disturbance=disturbance,
+        max_time_s=max_time_s,
+        realtime=realtime,
+        answer_timeout_s=answer_timeout_s,
+    )
+    return charge_and_report(settings, run_plant, out, json)

@@ -1,0 +1,92 @@
+"""The ECU on a bus: carries frames between the bus and an ECU, and tells it when to step.
+
+Imports neither the CAN database nor plotting, so that `bms ecu` starts quickly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from hil_sim.bus import CanBus, Frame
+from hil_sim.clock import Clock
+
+SYNC_ID = 0x080
+"""Start of a control period in lock step (CiA 301)."""
+
+_LONGEST_START_FRAMES = 1000
+
+
+class EcuLike(Protocol):
+    """The firmware, or a baseline in its place."""
+
+    def receive(self, frame_id: int, data: bytes) -> None:
+        """Take in a frame."""
+
+    def step(self) -> None:
+        """Run one control period."""
+
+    def transmit(self) -> Sequence[tuple[int, bytes]]:
+        """Frames of this step in order."""
+        ...
+
+
+class EcuNode:
+    """Connects an ECU to a bus and counts what passes."""
+
+    def __init__(self, bus: CanBus, ecu: EcuLike) -> None:
+        self._bus = bus
+        self._ecu = ecu
+        self.frames = 0
+        self.steps = 0
+
+    def answer(self, timeout_s: float) -> bool:
+        """Take in frames until a SYNC has been answered; False when timeout_s pass without."""
+        while (frame := self._bus.receive(timeout_s)) is not None:
+            if self._take(frame):
+                self._step()
+                return True
+        return False
+
+    def run(self, silence_s: float, stopped: Callable[[], bool], poll_s: float = 0.1) -> None:
+        """Answer every SYNC until `stopped`, or until silence_s without a frame after the first."""
+        self._await_gap(0.5 * poll_s)
+        silent_s = 0.0
+        while not stopped() and not (self.frames and silent_s >= silence_s):
+            seen = self.frames
+            if self.answer(poll_s) or self.frames > seen:
+                silent_s = 0.0
+            else:
+                silent_s += poll_s
+
+    def run_on_clock(
+        self, period_s: float, clock: Clock, silence_s: float, stopped: Callable[[], bool]
+    ) -> None:
+        """Step once a period by the clock, without SYNC; ends as `run` does."""
+        due_s = last_frame_s = clock.now_s()
+        while not stopped() and not (self.frames and due_s - last_frame_s >= silence_s):
+            due_s += period_s
+            while (left_s := due_s - clock.now_s()) > 0.0:
+                frame = self._bus.receive(left_s)
+                if frame is not None:
+                    self._take(frame)
+                    last_frame_s = due_s
+            if self.frames:
+                self._step()
+
+    def _take(self, frame: Frame) -> bool:
+        self.frames += 1
+        self._ecu.receive(frame.frame_id, frame.data)
+        return frame.frame_id == SYNC_ID
+
+    def _step(self) -> None:
+        self._ecu.step()
+        self.steps += 1
+        for frame_id, data in self._ecu.transmit():
+            self._bus.send(Frame(frame_id, data))
+
+    def _await_gap(self, gap_s: float) -> None:
+        """Let a period that began before the ECU listened pass, so that the first one is whole."""
+        for _ in range(_LONGEST_START_FRAMES):
+            if self._bus.receive(gap_s) is None:
+                return

@@ -1,0 +1,154 @@
+"""The plant's side of the bus: publishes measurements and the request, collects the answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bms.errors import BusError
+from hil_sim.bus import CanBus, Frame
+from hil_sim.database import MessageCodec, Values
+from hil_sim.e2e import Receiver, Sender
+from hil_sim.nodes.turns import Turn
+from hil_sim.recorder import Recorder
+from hil_sim.sensors import Readings
+
+REQUEST_OFF, REQUEST_CHARGE = 0, 1
+CONNECT_ATTEMPTS = 10
+
+_FROM_ECU = (
+    "ChargeCommand",
+    "Estimate",
+    "Decision",
+    "DecisionMargins",
+    "Diagnostics",
+    "Identity",
+)
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the charger asks for: on or off, the current wanted (A), state of charge at plug-in."""
+
+    charge: bool
+    reference_current_A: float
+    plug_in_soc: float
+
+
+class Answer:
+    """What the ECU said in one period: values by signal name, None where it said nothing."""
+
+    def __init__(self, values: Values, states: dict[int, str], constraints: dict[int, str]) -> None:
+        self._values = values
+        self._states = states
+        self._constraints = constraints
+
+    def value(self, signal: str) -> float | None:
+        """Value of a signal in the database's unit."""
+        return self._values.get(signal)
+
+    @property
+    def command_A(self) -> float | None:
+        """Commanded current in A."""
+        return self.value("CommandCurrent")
+
+    @property
+    def state(self) -> str | None:
+        """Name of the ECU's state, in small letters."""
+        return _choice(self._states, self.value("CommandState"))
+
+    @property
+    def active_constraint(self) -> str | None:
+        """Name of the constraint that decided, in small letters."""
+        return _choice(self._constraints, self.value("ActiveConstraint"))
+
+    @property
+    def feasible(self) -> bool | None:
+        """Whether the constraints left a current to choose."""
+        value = self.value("Feasible")
+        return bool(value) if value in (0, 1) else None
+
+
+class PlantNode:
+    """Talks to the ECU over a bus, one control period at a time."""
+
+    def __init__(
+        self,
+        bus: CanBus,
+        database: dict[str, MessageCodec],
+        turn: Turn,
+        recorder: Recorder | None = None,
+    ) -> None:
+        self._bus = bus
+        self._turn = turn
+        self._recorder = recorder
+        self._electrical = Sender(database["CellElectrical"])
+        self._thermal = Sender(database["CellThermal"])
+        self._coolant = Sender(database["Coolant"])
+        self._request = Sender(database["ChargeRequest"])
+        self._sync = Frame(database["SYNC"].frame_id, b"")
+        self._receivers = {database[name].frame_id: Receiver(database[name]) for name in _FROM_ECU}
+        self._last_id = database["ChargeCommand"].frame_id
+        self._states = database["ChargeCommand"].choices["CommandState"]
+        self._constraints = database["Decision"].choices["ActiveConstraint"]
+        self._connected = False
+
+    def exchange(self, period: int, readings: Readings, request: Request) -> Answer:
+        """Publish what is measured and wanted in a period, and return what the ECU answers.
+
+        Until an ECU has answered for the first time, a period of a lock step is offered again
+        with the same frames, so that the ECU may start later than the plant. Raises BusError
+        when none comes.
+        """
+        frames = self._frames(readings, request)
+        for _ in range(CONNECT_ATTEMPTS):
+            sent_s = self._turn.time_s(period)
+            for frame in frames:
+                self._bus.send(frame)
+            heard = [
+                (self._turn.time_s(period), frame)
+                for frame in self._turn.answers(self._bus, period, self._last_id)
+            ]
+            self._connected = self._connected or bool(heard)
+            if self._connected or not self._turn.sync:
+                break
+        else:
+            raise BusError(
+                f"bus '{self._bus.name}': no ECU answers; start 'bms ecu --bus {self._bus.name}'"
+            )
+        if self._recorder is not None:
+            for frame in frames:
+                self._recorder.record(sent_s, frame, received=False)
+            for time_s, frame in heard:
+                self._recorder.record(time_s, frame, received=True)
+        return self._answer([frame for _, frame in heard])
+
+    def _frames(self, readings: Readings, request: Request) -> list[Frame]:
+        frames = [
+            self._electrical.frame({"Current": readings.current_A, "Voltage": readings.voltage_V}),
+            self._thermal.frame(
+                {
+                    "SurfaceTemperature": readings.surface_temperature_K,
+                    "CoolantTemperature": readings.coolant_temperature_K,
+                }
+            ),
+            self._coolant.frame({"CoolingPower": readings.cooling_power_W}),
+            self._request.frame(
+                {
+                    "Request": REQUEST_CHARGE if request.charge else REQUEST_OFF,
+                    "ReferenceCurrent": request.reference_current_A,
+                    "PlugInStateOfCharge": request.plug_in_soc,
+                }
+            ),
+        ]
+        return [*frames, self._sync] if self._turn.sync else frames
+
+    def _answer(self, heard: list[Frame]) -> Answer:
+        values: Values = {}
+        for frame in heard:
+            receiver = self._receivers.get(frame.frame_id)
+            values.update((receiver.accept(frame.data) if receiver else None) or {})
+        return Answer(values, self._states, self._constraints)
+
+
+def _choice(names: dict[int, str], value: float | None) -> str | None:
+    return None if value is None else names.get(int(value), "unknown").lower()

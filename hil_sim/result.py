@@ -1,0 +1,133 @@
+"""What a run leaves behind: time series and the summary with stable keys."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from bms.cell import CellState
+from hil_sim.nodes.plant import Answer
+
+
+@dataclass
+class TimeSeries:
+    """One entry a control period; the time is 0 at the start of the charge.
+
+    Temperatures and state of charge are true values at the start of the period, current and
+    voltage those that the charger applies from then on. The estimate is None where the ECU gave
+    none.
+    """
+
+    time_s: list[float] = field(default_factory=list)
+    current_A: list[float] = field(default_factory=list)
+    voltage_V: list[float] = field(default_factory=list)
+    soc: list[float] = field(default_factory=list)
+    core_temperature_K: list[float] = field(default_factory=list)
+    surface_temperature_K: list[float] = field(default_factory=list)
+    coolant_temperature_K: list[float] = field(default_factory=list)
+    command_A: list[float | None] = field(default_factory=list)
+    estimated_core_temperature_K: list[float | None] = field(default_factory=list)
+    estimated_soc: list[float | None] = field(default_factory=list)
+    state: list[str | None] = field(default_factory=list)
+    active_constraint: list[str | None] = field(default_factory=list)
+    feasible: list[bool | None] = field(default_factory=list)
+
+    def append(
+        self, time_s: float, state: CellState, current_A: float, voltage_V: float, answer: Answer
+    ) -> None:
+        """Add a period: what is true at its start, and what the ECU answered."""
+        self.time_s.append(time_s)
+        self.current_A.append(current_A)
+        self.voltage_V.append(voltage_V)
+        self.soc.append(state.soc)
+        self.core_temperature_K.append(state.core_temperature_K)
+        self.surface_temperature_K.append(state.surface_temperature_K)
+        self.coolant_temperature_K.append(state.coolant_temperature_K)
+        self.command_A.append(answer.command_A)
+        self.estimated_core_temperature_K.append(answer.value("CoreTemperature"))
+        self.estimated_soc.append(answer.value("StateOfCharge"))
+        self.state.append(answer.state)
+        self.active_constraint.append(answer.active_constraint)
+        self.feasible.append(answer.feasible)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Figures of a run. The first thirteen are a stable interface; None where there is none."""
+
+    controller: str
+    preset: str
+    bus: str
+    steps: int
+    max_core_temperature_K: float
+    max_surface_temperature_K: float
+    max_voltage_V: float
+    final_soc: float
+    charge_time_s: float | None
+    first_derate_s: float | None
+    kan_rmse_K: float | None
+    kan_max_abs_error_K: float | None
+    wall_time_s: float
+    max_soc: float
+    limits_kept: bool
+    violations: tuple[str, ...]
+    stop_reason: str
+    infeasible_steps: int
+    error_bound_K: float | None
+    seed: int
+    disturbance: str
+    realtime: bool
+    model_hash: str | None
+    preset_hash: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain mapping in the order of the fields."""
+        return asdict(self)
+
+    @property
+    def passed(self) -> bool:
+        """Whether every limit was kept and the charge did not end in a fault or in silence."""
+        return self.limits_kept and self.stop_reason in (STOP_COMPLETE, STOP_TIME_LIMIT)
+
+
+STOP_COMPLETE, STOP_TIME_LIMIT = "complete", "time-limit"
+STOP_FAULT, STOP_SILENT = "fault", "ecu-silent"
+
+DERATE_TOLERANCE_A = 0.01
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """A finished run."""
+
+    summary: Summary
+    series: TimeSeries
+
+
+def first_derate_s(series: TimeSeries, reference_A: float) -> float | None:
+    """First time in s at which less than the reference was commanded while charging."""
+    for time_s, state, command_A in zip(series.time_s, series.state, series.command_A):
+        if state not in ("charging", "derated") or command_A is None:
+            continue
+        if command_A > reference_A + DERATE_TOLERANCE_A:
+            return time_s
+    return None
+
+
+def estimate_errors_K(series: TimeSeries) -> list[float]:
+    """Estimated less true core temperature (K) in every period of the charge with an estimate."""
+    return [
+        estimate - truth
+        for time_s, estimate, truth in zip(
+            series.time_s, series.estimated_core_temperature_K, series.core_temperature_K
+        )
+        if estimate is not None and time_s >= 0.0
+    ]
+
+
+def rmse_K(errors_K: list[float]) -> float | None:
+    """Root of the mean square, None for no errors."""
+    if not errors_K:
+        return None
+    return math.sqrt(math.fsum(error * error for error in errors_K) / len(errors_K))

@@ -1,0 +1,40 @@
+"""Readings of the five measured quantities with resolution, noise and bias of a preset."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from bms.presets.schema import Sensor, Sensors
+
+
+class Readings(NamedTuple):
+    """What is measured: current (A), voltage (V), two temperatures (K), cooling power (W)."""
+
+    current_A: float
+    voltage_V: float
+    surface_temperature_K: float
+    coolant_temperature_K: float
+    cooling_power_W: float
+
+
+class SensorSuite:
+    """Turns true values into readings; deterministic for a given generator."""
+
+    def __init__(self, sensors: Sensors, rng: np.random.Generator) -> None:
+        self._channels: list[Sensor] = [getattr(sensors, name) for name in Readings._fields]
+        self._rng = rng
+
+    def read(self, truth: Readings) -> Readings:
+        """Reading of each channel: truth, bias and noise, rounded to the resolution."""
+        cutoff = Sensor.NOISE_CUTOFF
+        noise = np.clip(self._rng.standard_normal(len(truth)), -cutoff, cutoff).tolist()
+        return Readings(*map(_reading, self._channels, truth, noise))
+
+
+def _reading(sensor: Sensor, truth: float, normal: float) -> float:
+    value = truth + sensor.bias + sensor.noise_std * normal
+    if sensor.resolution == 0.0:
+        return value
+    return sensor.resolution * round(value / sensor.resolution)

@@ -1,0 +1,199 @@
+"""Puts the parts of a run together: seeds, buses, nodes, controller; runs; sums up."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+import numpy as np
+
+from bms.baselines.s_cbf import SurfaceBarrierController
+from bms.errors import InputError
+from bms.firmware import Ecu
+from bms.presets import Preset
+from hil_sim.bus import CanBus, is_private, open_bus
+from hil_sim.charge import Charge, Progress
+from hil_sim.charger import Charger
+from hil_sim.clock import WallClock
+from hil_sim.database import MessageCodec, load_database
+from hil_sim.disturbances import DisturbanceKind, disturbance_source
+from hil_sim.nodes.ecu import EcuLike, EcuNode
+from hil_sim.nodes.plant import PlantNode
+from hil_sim.nodes.turns import LockStep, OnClock, PacedLockStep, Turn
+from hil_sim.oracle import OracleEcu
+from hil_sim.plant import SUB_STEPS, Plant
+from hil_sim.recorder import Recorder
+from hil_sim.result import RunResult, Summary, estimate_errors_K, first_derate_s, rmse_K
+from hil_sim.sensors import SensorSuite
+
+ANSWER_TIMEOUT_S = 1.0
+
+
+class ControllerKind(str, Enum):
+    """Names on the command line."""
+
+    KAN_RCBF = "kan-rcbf"
+    S_CBF = "s-cbf"
+
+
+EcuFactory = Callable[[Plant, "dict[str, MessageCodec]"], EcuLike]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What determines a run. The delay is in control periods, the time limit from the edge."""
+
+    preset: Preset
+    controller: ControllerKind = ControllerKind.KAN_RCBF
+    model: Path | None = None
+    bus: str = "virtual:bms"
+    seed: int = 0
+    disturbance: DisturbanceKind = DisturbanceKind.NONE
+    charger_delay_periods: int = 0
+    max_time_s: float = 3600.0
+    realtime: bool = False
+    answer_timeout_s: float = ANSWER_TIMEOUT_S
+
+
+def run_both(
+    settings: Settings,
+    recorder: Recorder | None = None,
+    progress: Progress = lambda soc: None,
+    ecu_factory: EcuFactory | None = None,
+) -> RunResult:
+    """Plant and ECU in this process and thread, on two connections to one bus.
+
+    `ecu_factory` replaces the controller that the settings name. Raises InputError or BusError.
+    """
+    database = load_database()
+    with ExitStack() as stack:
+        plant = _plant(settings)
+        make = ecu_factory or _factory(settings)
+        ecu = make(plant, database)
+        ecu_bus = stack.enter_context(open_bus(settings.bus))
+        plant_bus = stack.enter_context(open_bus(settings.bus))
+        node = EcuNode(ecu_bus, ecu)
+        period_s = settings.preset.timing.sampling_period_s
+        timeout_s = settings.answer_timeout_s
+
+        def serve() -> None:
+            node.answer(timeout_s)
+
+        turn: Turn
+        if settings.realtime:
+            turn = PacedLockStep(period_s, timeout_s, serve, WallClock())
+        else:
+            turn = LockStep(period_s, timeout_s, serve)
+        return _run(settings, plant, plant_bus, database, turn, recorder, progress)
+
+
+def run_plant(
+    settings: Settings, recorder: Recorder | None = None, progress: Progress = lambda soc: None
+) -> RunResult:
+    """The plant alone, with an ECU on the bus in another process.
+
+    Raises InputError for a bus that no other process can be on, BusError when no ECU answers.
+    """
+    if is_private(settings.bus):
+        raise InputError(
+            f"bus '{settings.bus}': reaches parties in one process only; use 'bms sil', "
+            "or a bus such as socketcan:vcan0 for two processes"
+        )
+    period_s = settings.preset.timing.sampling_period_s
+    plant = _plant(settings)
+    with open_bus(settings.bus) as bus:
+        turn: Turn
+        if settings.realtime:
+            turn = OnClock(period_s, WallClock())
+        else:
+            turn = LockStep(period_s, settings.answer_timeout_s)
+        return _run(settings, plant, bus, load_database(), turn, recorder, progress)
+
+
+def _generators(seed: int) -> list[np.random.Generator]:
+    """Independent random numbers for disturbance and sensors, so that one leaves the other."""
+    return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)]
+
+
+def _plant(settings: Settings) -> Plant:
+    preset = settings.preset
+    step_s = preset.timing.sampling_period_s / SUB_STEPS
+    rng, _ = _generators(settings.seed)
+    return Plant(preset, disturbance_source(settings.disturbance, preset, step_s, rng))
+
+
+def _factory(settings: Settings) -> EcuFactory:
+    preset = settings.preset
+    if settings.controller is ControllerKind.KAN_RCBF:
+        return lambda plant, database: Ecu(preset=preset, model=settings.model)
+    return lambda plant, database: OracleEcu(
+        SurfaceBarrierController(preset),
+        preset,
+        database,
+        lambda: plant.state,
+        plant.cooling_power_W,
+    )
+
+
+def _run(
+    settings: Settings,
+    plant: Plant,
+    bus: CanBus,
+    database: dict[str, MessageCodec],
+    turn: Turn,
+    recorder: Recorder | None,
+    progress: Progress,
+) -> RunResult:
+    preset = settings.preset
+    _, sensor_rng = _generators(settings.seed)
+    charge = Charge(
+        preset=preset,
+        node=PlantNode(bus, database, turn, recorder),
+        plant=plant,
+        sensors=SensorSuite(preset.sensors, sensor_rng),
+        charger=Charger(preset, settings.charger_delay_periods),
+        max_time_s=settings.max_time_s,
+        progress=progress,
+    )
+    start_s = time.perf_counter()
+    reason = charge.run()
+    return _sum_up(settings, charge, reason, time.perf_counter() - start_s)
+
+
+def _sum_up(settings: Settings, charge: Charge, reason: str, wall_time_s: float) -> RunResult:
+    series, extremes = charge.series, charge.plant.extremes
+    limits = settings.preset.limits
+    estimates = settings.controller is ControllerKind.KAN_RCBF
+    errors_K = estimate_errors_K(series) if estimates else []
+    violations = tuple(extremes.violations(limits))
+    summary = Summary(
+        controller=settings.controller.value,
+        preset=settings.preset.name,
+        bus=settings.bus,
+        steps=charge.steps,
+        max_core_temperature_K=extremes.core_temperature_K,
+        max_surface_temperature_K=extremes.surface_temperature_K,
+        max_voltage_V=extremes.voltage_V,
+        final_soc=charge.plant.state.soc,
+        charge_time_s=series.time_s[-1] if reason == "complete" else None,
+        first_derate_s=first_derate_s(series, limits.reference_current_A),
+        kan_rmse_K=rmse_K(errors_K),
+        kan_max_abs_error_K=max(map(abs, errors_K), default=None),
+        wall_time_s=round(wall_time_s, 3),
+        max_soc=extremes.soc,
+        limits_kept=not violations,
+        violations=violations,
+        stop_reason=reason,
+        infeasible_steps=series.feasible.count(False),
+        error_bound_K=charge.error_bound_K if estimates else None,
+        seed=settings.seed,
+        disturbance=settings.disturbance.value,
+        realtime=settings.realtime,
+        model_hash=charge.identity.model if charge.identity else None,
+        preset_hash=settings.preset.hash,
+    )
+    return RunResult(summary, series)

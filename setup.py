@@ -1,0 +1,5 @@
+"""Everything is in pyproject.toml, except that setuptools takes cffi modules here only."""
+
+from setuptools import setup
+
+setup(cffi_modules=["bms/firmware/build.py:ffibuilder"])
