@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-from bms.errors import BusError
+from bms.errors import BusError, InputError
 
 RECEIVE_BUFFER_BYTES = 1 << 20
 _STANDARD_FRAMES = [{"can_id": 0, "can_mask": 0, "extended": False}]
@@ -105,9 +105,13 @@ def open_bus(name: str) -> CanBus:
     return CanBus(name, bus)
 
 
-def is_private(name: str) -> bool:
-    """Whether only parties in one process can meet on a bus of this name."""
-    return name.startswith("virtual:")
+def require_shared(name: str) -> None:
+    """Raise InputError for a bus on which only parties in one process can meet."""
+    if name.startswith("virtual:"):
+        raise InputError(
+            f"bus '{name}': reaches parties in one process only; use 'bms sil', "
+            "or a bus such as socketcan:vcan0 for two processes"
+        )
 
 
 def _remedy(interface: str) -> str:

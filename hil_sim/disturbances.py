@@ -1,8 +1,8 @@
 """Process disturbances within the bounds of a preset, as knots at the plant's sub-steps.
 
 A source yields the disturbance at the end of each sub-step; between two knots it runs linearly.
-Every source starts from zero, stays within the preset's bounds, and lets the surface disturbance
-change by no more than its slope bound allows.
+Every source stays within the preset's bounds; the surface disturbance starts from zero and changes
+by no more than its slope bound allows.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ from hil_sim.e2e import Receiver, Sender
 from hil_sim.nodes.plant import REQUEST_CHARGE
 
 STANDBY, CHARGING, DERATED, COMPLETE = 1, 2, 3, 4
+NO_FAULT = 0xFF
 _SENT = ("Estimate", "Decision", "DecisionMargins", "Diagnostics", "ChargeCommand")
 
 
@@ -81,7 +82,7 @@ def _values(state: CellState, decision: Decision | None, state_number: int) -> V
         "CommandCurrent": decision.current_A if decision else 0.0,
         "CommandState": state_number,
         "DiagnosticState": state_number,
-        "FirstFault": 0,
+        "FirstFault": NO_FAULT,
         "ActiveFaults": 0,
         "LatchedFaults": 0,
         "CoreTemperature": state.core_temperature_K,

@@ -94,6 +94,7 @@ class Summary:
 STOP_COMPLETE, STOP_TIME_LIMIT = "complete", "time-limit"
 STOP_FAULT, STOP_SILENT = "fault", "ecu-silent"
 
+CHARGING_STATES = ("charging", "derated")
 DERATE_TOLERANCE_A = 0.01
 
 
@@ -108,11 +109,19 @@ class RunResult:
 def first_derate_s(series: TimeSeries, reference_A: float) -> float | None:
     """First time in s at which less than the reference was commanded while charging."""
     for time_s, state, command_A in zip(series.time_s, series.state, series.command_A):
-        if state not in ("charging", "derated") or command_A is None:
+        if state not in CHARGING_STATES or command_A is None:
             continue
         if command_A > reference_A + DERATE_TOLERANCE_A:
             return time_s
     return None
+
+
+def infeasible_steps(series: TimeSeries) -> int:
+    """Control periods of the charge in which the constraints left no current but 0 A."""
+    return sum(
+        feasible is False and state in CHARGING_STATES
+        for feasible, state in zip(series.feasible, series.state)
+    )
 
 
 def estimate_errors_K(series: TimeSeries) -> list[float]:

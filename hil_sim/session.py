@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from bms.baselines.s_cbf import SurfaceBarrierController
-from bms.errors import InputError
 from bms.firmware import Ecu
 from bms.presets import Preset
-from hil_sim.bus import CanBus, is_private, open_bus
+from hil_sim.bus import CanBus, open_bus, require_shared
 from hil_sim.charge import Charge, Progress
 from hil_sim.charger import Charger
 from hil_sim.clock import WallClock
@@ -27,7 +26,14 @@ from hil_sim.nodes.turns import LockStep, OnClock, PacedLockStep, Turn
 from hil_sim.oracle import OracleEcu
 from hil_sim.plant import SUB_STEPS, Plant
 from hil_sim.recorder import Recorder
-from hil_sim.result import RunResult, Summary, estimate_errors_K, first_derate_s, rmse_K
+from hil_sim.result import (
+    RunResult,
+    Summary,
+    estimate_errors_K,
+    first_derate_s,
+    infeasible_steps,
+    rmse_K,
+)
 from hil_sim.sensors import SensorSuite
 
 ANSWER_TIMEOUT_S = 1.0
@@ -98,11 +104,7 @@ def run_plant(
 
     Raises InputError for a bus that no other process can be on, BusError when no ECU answers.
     """
-    if is_private(settings.bus):
-        raise InputError(
-            f"bus '{settings.bus}': reaches parties in one process only; use 'bms sil', "
-            "or a bus such as socketcan:vcan0 for two processes"
-        )
+    require_shared(settings.bus)
     period_s = settings.preset.timing.sampling_period_s
     plant = _plant(settings)
     with open_bus(settings.bus) as bus:
@@ -188,7 +190,7 @@ def _sum_up(settings: Settings, charge: Charge, reason: str, wall_time_s: float)
         limits_kept=not violations,
         violations=violations,
         stop_reason=reason,
-        infeasible_steps=series.feasible.count(False),
+        infeasible_steps=infeasible_steps(series),
         error_bound_K=charge.error_bound_K if estimates else None,
         seed=settings.seed,
         disturbance=settings.disturbance.value,

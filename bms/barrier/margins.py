@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from bms.barrier.constants import barrier_constants
+from bms.barrier.rates import Weights, largest_rate
 from bms.cell import CellParameters
 from bms.presets.schema import Preset
 
@@ -42,33 +43,8 @@ class Margins:
     surface_K_per_s2: Any
 
 
-def temperature_rate_bound_K_per_s(cell: CellParameters, preset: Preset) -> Any:
-    """Largest rate of any of the three temperatures while charging, from a start at rest.
-
-    The heat flows core -> surface -> coolant stay within the range of heat generation and cooling,
-    which bounds the core's and the coolant's rate directly; the surface's rate is a low-pass mean
-    of the two and can exceed neither.
-    """
-    current_A = -preset.limits.reference_current_A
-    reversible_W = (
-        np.abs(cell.entropic_coefficient_V_per_K) * preset.limits.max_core_temperature_K * current_A
-    )
-    cooling_W = preset.operating_box.cooling_power_W[1]
-    largest_W = cell.ohmic_resistance_ohm * current_A**2 + reversible_W
-    smallest_W = -reversible_W * (np.asarray(cell.entropic_coefficient_V_per_K) < 0)
-    bounds = preset.uncertainty
-    disturbance = bounds.core_K_per_s + bounds.surface_K_per_s + bounds.coolant_K_per_s
-    return (
-        np.maximum(
-            (largest_W - smallest_W) / cell.core_heat_capacity_J_per_K,
-            np.maximum(largest_W, cooling_W - smallest_W) / cell.coolant_heat_capacity_J_per_K,
-        )
-        + 2.0 * disturbance
-    )
-
-
 def soc_error_bound(cell: CellParameters, preset: Preset, bus: BusQuantisation) -> float:
-    """Bound on the counted state of charge: bias and rounding add up, noise adds as its root."""
+    """Bound on the counted state of charge: bias, rounding and disturbance add up, noise as its root."""
     sensor = preset.sensors.current_A
     steady_A = abs(sensor.bias) + 0.5 * sensor.resolution + bus.current_A
     noise_As = (
@@ -76,7 +52,9 @@ def soc_error_bound(cell: CellParameters, preset: Preset, bus: BusQuantisation) 
         * sensor.noise_std
         * float(np.sqrt(preset.timing.sampling_period_s * COUNTING_HORIZON_S))
     )
-    return (steady_A * COUNTING_HORIZON_S + noise_As) / cell.capacity_As
+    return (
+        steady_A * COUNTING_HORIZON_S + noise_As
+    ) / cell.capacity_As + preset.uncertainty.soc_per_s * COUNTING_HORIZON_S
 
 
 def sampling_margins(
@@ -87,10 +65,10 @@ def sampling_margins(
     sensors, limits = preset.sensors, preset.limits
     current_A = -limits.reference_current_A
     held_s = preset.timing.sampling_period_s + preset.timing.delay_s
-    rate = temperature_rate_bound_K_per_s(cell, preset)
     core_gain = preset.gains.core_gain_per_s(cell)
 
-    soc_change = held_s * current_A / cell.capacity_As + soc_error_bound(cell, preset, bus)
+    soc_rate_per_s = current_A / cell.capacity_As + preset.uncertainty.soc_per_s
+    soc_change = held_s * soc_rate_per_s + soc_error_bound(cell, preset, bus)
     upper_V, lower_soc = np.asarray(cell.ocv.voltage_V[1:]), np.asarray(cell.ocv.soc[:-1])
     near_limit = np.logical_and(
         upper_V[..., None] + current_A * cell.ohmic_resistance_ohm > limits.max_voltage_V,
@@ -102,23 +80,30 @@ def sampling_margins(
     coolant_error_K = sensors.coolant_temperature_K.error_bound + bus.coolant_temperature_K
     cooling_error_W = sensors.cooling_power_W.error_bound + bus.cooling_power_W
 
-    core_slope = rate * (
-        np.abs(core_gain - constants.a1_per_s)
-        + constants.a1_per_s
-        + np.abs(constants.a2_per_As) * current_A
+    # How fast each left-hand side can fall at a held current; the terms with a product of core
+    # temperature and current are bounded by the largest current, falling with a warming core.
+    entropic_per_A = Weights(np.sign(cell.entropic_coefficient_V_per_K), 0.0, 0.0)
+    coupling = largest_rate(cell, preset, entropic_per_A) * current_A
+    core_fall = (
+        largest_rate(
+            cell, preset, Weights(core_gain - constants.a1_per_s, constants.a1_per_s, 0.0)
+        )
+        + np.abs(constants.a2_per_As) * coupling
     )
-    surface_slope = rate * (
-        2.0 * np.abs(constants.a4_per_s2)
-        + 2.0 * np.abs(constants.a6_per_s2)
-        + preset.gains.alpha3_per_s2
-        + np.abs(constants.a8_per_As2) * current_A
+    surface_fall = (
+        largest_rate(
+            cell,
+            preset,
+            Weights(-constants.a4_per_s2, -constants.a5_per_s2, -constants.a6_per_s2),
+        )
+        + np.abs(constants.a8_per_As2) * coupling
     )
     return Margins(
         voltage_V=_plain(steepest_V * soc_change),
         soc_per_s=_plain(preset.gains.alpha1_per_s * soc_change),
-        core_K_per_s=_plain(held_s * core_slope + constants.a1_per_s * surface_error_K),
+        core_K_per_s=_plain(held_s * core_fall + constants.a1_per_s * surface_error_K),
         surface_K_per_s2=_plain(
-            held_s * surface_slope
+            held_s * surface_fall
             + np.abs(constants.a5_per_s2) * surface_error_K
             + np.abs(constants.a6_per_s2) * coolant_error_K
             + constants.a10_K_per_Ws2 * cooling_error_W

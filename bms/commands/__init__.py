@@ -1,0 +1,1 @@
+"""Subcommands of `bms` that belong to battery engineering; one module each."""

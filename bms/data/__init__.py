@@ -1,0 +1,1 @@
+"""Data sets: simulated charging profiles and measured recordings."""

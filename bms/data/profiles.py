@@ -20,9 +20,9 @@ Kind = Literal["constant", "dynamic"]
 KINDS: tuple[Kind, ...] = ("constant", "dynamic")
 
 SAMPLE_PERIOD_S = 1.0
-_DURATION_S = {"constant": 1800.0, "dynamic": 1200.0}
+_DURATION_S = {"constant": 3600.0, "dynamic": 1200.0}
 _COLDEST_START_ABOVE_BOX_K = 2.0
-_WARMEST_START_BELOW_BOX_K = 18.0
+_WARMEST_START_BELOW_BOX_K = 13.0
 _MAX_INITIAL_SOC = 0.2
 _SHARE_OF_RESTS = 0.2
 _SHARE_OF_STEPS = 0.25
@@ -85,12 +85,12 @@ def _wandering_current_A(
         level_A = _level_A(limits_A, rng)
         change_A = abs(level_A - currents_A[-1])
         is_step = rng.random() < _SHARE_OF_STEPS
-        ramp_s = SAMPLE_PERIOD_S if is_step else change_A / np.exp(
-            rng.uniform(*np.log(_RAMP_A_PER_S))
-        )
+        rate_A_per_s = np.exp(rng.uniform(*np.log(_RAMP_A_PER_S)))
+        ramp_s = SAMPLE_PERIOD_S if is_step else change_A / rate_A_per_s
         times_s += [held_until_s, held_until_s + ramp_s]
         currents_A += [currents_A[-1], level_A]
-    return np.interp(np.arange(steps) * SAMPLE_PERIOD_S, times_s, currents_A)
+    sampled_A: Array = np.interp(np.arange(steps) * SAMPLE_PERIOD_S, times_s, currents_A)
+    return sampled_A
 
 
 def _level_A(limits_A: tuple[float, float], rng: np.random.Generator) -> float:

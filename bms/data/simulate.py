@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from bms.cell import CellParameters, CellState, Disturbance, integrate_step
 from bms.data.profiles import SAMPLE_PERIOD_S, Array, Profiles
@@ -23,7 +25,18 @@ class Samples:
 
     inputs: Array
     core_temperature_K: Array
-    profile: Array
+    profile: npt.NDArray[np.int64]
+
+
+def joined(parts: Iterable[Samples]) -> Samples:
+    """All samples in one; profile numbers go on from part to part."""
+    collected = list(parts)
+    ends = np.cumsum([0, *(part.profile.max() + 1 for part in collected)])
+    return Samples(
+        np.concatenate([part.inputs for part in collected]),
+        np.concatenate([part.core_temperature_K for part in collected]),
+        np.concatenate([part.profile + end for part, end in zip(collected, ends)]),
+    )
 
 
 def simulate(preset: Preset, profiles: Profiles, rng: np.random.Generator) -> Samples:
@@ -40,8 +53,13 @@ def simulate(preset: Preset, profiles: Profiles, rng: np.random.Generator) -> Sa
     for wanted_A in profiles.wanted_current_A.T:
         current_A = np.maximum(wanted_A, _derated_current_A(cell, state, profiles.core_limit_K))
         inputs = np.stack(
-            [current_A, profiles.cooling_power_W, state.surface_temperature_K,
-             state.coolant_temperature_K], axis=1,
+            [
+                current_A,
+                profiles.cooling_power_W,
+                state.surface_temperature_K,
+                state.coolant_temperature_K,
+            ],
+            axis=1,
         )
         low, high = np.transpose(box.ranges())
         alive &= np.all((inputs >= low) & (inputs <= high), axis=1) & (state.soc <= 1.0)
@@ -50,7 +68,11 @@ def simulate(preset: Preset, profiles: Profiles, rng: np.random.Generator) -> Sa
         numbers.append(np.flatnonzero(alive))
         noise = PROCESS_NOISE_K_PER_S * rng.standard_normal((3, len(start_K)))
         state = integrate_step(
-            cell, state, current_A, profiles.cooling_power_W, SAMPLE_PERIOD_S,
+            cell,
+            state,
+            current_A,
+            profiles.cooling_power_W,
+            SAMPLE_PERIOD_S,
             Disturbance(0.0, *noise),
         )
     return Samples(np.concatenate(rows), np.concatenate(cores), np.concatenate(numbers))
@@ -59,11 +81,13 @@ def simulate(preset: Preset, profiles: Profiles, rng: np.random.Generator) -> Sa
 def _derated_current_A(cell: CellParameters, state: CellState, core_limit_K: Array) -> Array:
     """Charging current at which dTc/dt = (limit - Tc)/(Rc Cc), as a core barrier would allow.
 
-    Root of the core constraint of the paper without margins; 0 where even no current is too much.
+    Root of the core constraint of the paper without margins; where the surface is above the limit
+    already, the current whose reversible and ohmic heat cancel.
     """
     core_K = state.core_temperature_K
     slope = cell.entropic_coefficient_V_per_K * core_K
     spare_W = (core_limit_K - state.surface_temperature_K) / cell.core_resistance_K_per_W
     resistance = cell.ohmic_resistance_ohm
-    root = np.sqrt(np.maximum(slope**2 + 4.0 * resistance * np.maximum(spare_W, 0.0), 0.0))
-    return np.minimum((slope - root) / (2.0 * resistance), 0.0)
+    root = np.sqrt(slope**2 + 4.0 * resistance * np.maximum(spare_W, 0.0))
+    current_A: Array = np.minimum((slope - root) / (2.0 * resistance), 0.0)
+    return current_A

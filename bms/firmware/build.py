@@ -58,21 +58,20 @@ def declarations(header: Path) -> str:
     return "\n".join(lines)
 
 
-def make_builder(flags: tuple[str, ...] = FLAGS) -> FFI:
-    """Builder of the extension; source paths are relative to the root of the repository."""
+def make_builder(flags: tuple[str, ...] = FLAGS, base: Path = Path()) -> FFI:
+    """Builder of the extension; source paths begin with base, which setuptools wants relative."""
     builder = FFI()
-    include = ROOT / FIRMWARE / "include"
-    builder.cdef("\n".join(declarations(include / f"{name}.h") for name in HEADERS))
+    builder.cdef(
+        "\n".join(declarations(ROOT / FIRMWARE / "include" / f"{name}.h") for name in HEADERS)
+    )
     builder.cdef(_HOST_DECLARATIONS)
-    folders = [FIRMWARE / "src", FIRMWARE / "generated"]
-    sources = [
-        str(path.relative_to(ROOT)) for folder in folders for path in (ROOT / folder).glob("*.c")
-    ]
+    folders = [FIRMWARE / name for name in ("include", "src", "generated")]
+    sources = [path for folder in folders for path in sorted((ROOT / folder).glob("*.c"))]
     builder.set_source(
         MODULE,
         _HOST_SOURCE,
-        sources=sorted(sources),
-        include_dirs=[str(FIRMWARE / "include"), *map(str, folders)],
+        sources=[str(base / path.relative_to(ROOT)) for path in sources],
+        include_dirs=[str(base / folder) for folder in folders],
         extra_compile_args=list(flags),
         extra_link_args=[flag for flag in flags if flag.startswith("-fsanitize")],
     )
@@ -86,7 +85,7 @@ def main() -> None:
     parser.add_argument("--sanitize", action="store_true", help="address and undefined behaviour")
     arguments = parser.parse_args()
     flags = (*FLAGS, *SANITIZERS) if arguments.sanitize else FLAGS
-    print(make_builder(flags).compile(tmpdir=str(arguments.out), verbose=False))
+    print(make_builder(flags, ROOT).compile(tmpdir=str(arguments.out)))
 
 
 if __name__ == "__main__":

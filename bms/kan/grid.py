@@ -65,8 +65,12 @@ def solve_last_layer(layers: list[TrainableLayer], x: Array, target: Array) -> l
     nodes = forward(layers[:-1], x)
     low, high = last.knots[:, [last.degree]], last.knots[:, [-last.degree - 1]]
     nodes = np.clip(nodes, low, high)
-    design = [silu(nodes), *(basis(row, knots, last.degree) for row, knots in zip(nodes, last.knots))]
-    solution = np.linalg.lstsq(np.concatenate(design).T, target, rcond=None)[0]
+    design = [
+        silu(nodes),
+        *(basis(row, knots, last.degree) for row, knots in zip(nodes, last.knots)),
+    ]
+    fit = np.linalg.lstsq(np.concatenate(design).T, target, rcond=None)[0]
+    solution = np.asarray(fit, dtype=np.float64)
     inputs = len(last.knots)
     solved = TrainableLayer(
         last.degree,

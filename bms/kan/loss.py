@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bms.kan.basis import Array
-from bms.kan.trainable import TrainableLayer, activations, backward, expand
+from bms.kan.trainable import Expansion, TrainableLayer, activations, backward, expand
 
 _TINY = 1e-300
 
@@ -41,7 +41,8 @@ class Loss:
     def __call__(self, parameters: Array) -> tuple[float, Array]:
         """Loss and its gradient at the parameters of all layers in one row."""
         layers = with_parameters(self._layers, parameters)
-        expansion, caches = self._first, []
+        expansion = self._first
+        caches: list[tuple[Expansion, Array]] = []
         for number, layer in enumerate(layers):
             if number > 0:
                 expansion = expand(layer, caches[-1][1].sum(axis=0))
@@ -69,9 +70,9 @@ class Loss:
         share = np.maximum(magnitude / max(total, _TINY), _TINY)
         entropy = float(-(share * np.log(share)).sum())
         weights = self._penalty
-        by_magnitude = weights.l1_weight - weights.entropy_weight * (
-            np.log(share) + entropy
-        ) / max(total, _TINY)
+        by_magnitude = weights.l1_weight - weights.entropy_weight * (np.log(share) + entropy) / max(
+            total, _TINY
+        )
         cost = weights.l1_weight * total + weights.entropy_weight * entropy
         by_phi = np.sign(phi) * by_magnitude[:, :, None] / phi.shape[2]
         return weights.regularisation * cost, weights.regularisation * by_phi

@@ -56,7 +56,6 @@ class TrainingRecord:
     data: str
     data_sha256: str | None
     profiles: dict[str, int]
-    samples: dict[str, int]
 
 
 @strict

@@ -31,8 +31,7 @@ class TrainingSettings:
     regularisation: NonNegative = 5e-5
     l1_penalty: NonNegative = 0.14
     entropy_penalty: NonNegative = 0.17
-    refinement_steps: Annotated[int, Ge(0)] = 400
-    starts: Count = 1
+    refinement_steps: Annotated[int, Ge(0)] = 80
     seed: Annotated[int, Ge(0)] = 0
 
     def __post_init__(self) -> None:

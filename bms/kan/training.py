@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from bms.data.simulate import Samples
 from bms.errors import InputError
 from bms.kan.basis import Array, uniform_knots
 from bms.kan.descent import descend, gauss_newton_directions
@@ -14,6 +15,8 @@ from bms.kan.loss import Loss, Penalty
 from bms.kan.network import INPUT_NAMES, Network
 from bms.kan.settings import TrainingSettings
 from bms.kan.trainable import TrainableLayer, forward
+
+Ranges = tuple[tuple[float, float], ...]
 
 _STEPS_PER_EPOCH = 20
 _EPOCHS_PER_GRID_UPDATE = 5
@@ -24,38 +27,35 @@ _NO_PENALTY = Penalty(0.0, 0.0, 0.0)
 
 
 def train_network(
-    inputs: Array,
-    core_temperature_K: Array,
-    ranges: tuple[tuple[float, float], ...],
+    training: Samples,
+    validation: Samples,
+    ranges: Ranges,
     settings: TrainingSettings,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Network:
-    """Network fitted to samples: inputs (N, n_in) within `ranges`, core temperature (N,) in K.
+    """Network fitted to samples whose inputs lie within `ranges`, (low, high) for each input.
 
     Each epoch takes a few L-BFGS steps on a new batch; until the epoch of `grid_update_stop` the
     grids follow the data. The refinement takes all samples and no penalties, which would leave a
-    bias of some hundredths of a kelvin. The best of `starts` is kept. `progress` gets the share
+    bias of some hundredths of a kelvin. Of the network after the epochs and after each round of
+    the refinement, the one with the smallest validation error is kept. `progress` gets the share
     done, 0..1. Raises InputError when the width does not fit the inputs.
     """
     if settings.width[0] != len(ranges):
         raise InputError(f"width: must begin with {len(ranges)}, the number of inputs")
     low, high = np.transpose(np.asarray(ranges))
     center, half_range = 0.5 * (low + high), 0.5 * (high - low)
-    top_K, bottom_K = float(core_temperature_K.max()), float(core_temperature_K.min())
-    output_center_K, output_half_range_K = 0.5 * (top_K + bottom_K), 0.5 * (top_K - bottom_K)
-    x = np.ascontiguousarray(((inputs - center) / half_range).T)
-    target = (core_temperature_K - output_center_K) / output_half_range_K
+    coldest_K = float(training.core_temperature_K.min())
+    warmest_K = float(training.core_temperature_K.max())
+    output_center_K = 0.5 * (warmest_K + coldest_K)
+    # A recording at one temperature still needs a scale.
+    output_half_range_K = max(0.5 * (warmest_K - coldest_K), 1e-3)
 
-    best: tuple[float, list[TrainableLayer]] | None = None
-    for start in range(settings.starts):
-        rng = np.random.default_rng([settings.seed, start])
-        layers = _one_start(
-            x, target, settings, rng, lambda s: progress((start + s) / settings.starts)
-        )
-        mse = float(np.mean((forward(layers, x)[0] - target) ** 2))
-        if best is None or mse < best[0]:
-            best = mse, layers
-    assert best is not None
+    def normalised(samples: Samples) -> tuple[Array, Array]:
+        x = np.ascontiguousarray(((samples.inputs - center) / half_range).T)
+        return x, (samples.core_temperature_K - output_center_K) / output_half_range_K
+
+    layers = _fitted_layers(normalised(training), normalised(validation), settings, progress)
     return Network(
         settings.degree,
         INPUT_NAMES,
@@ -63,35 +63,46 @@ def train_network(
         tuple(half_range.tolist()),
         output_center_K,
         output_half_range_K,
-        tuple(layer.frozen() for layer in best[1]),
+        tuple(layer.frozen() for layer in layers),
     )
 
 
-def _one_start(
-    x: Array,
-    target: Array,
+def _fitted_layers(
+    training: tuple[Array, Array],
+    validation: tuple[Array, Array],
     settings: TrainingSettings,
-    rng: np.random.Generator,
     progress: Callable[[float], None],
 ) -> list[TrainableLayer]:
+    x, target = training
+    rng = np.random.default_rng(settings.seed)
     penalty = Penalty(settings.regularisation, settings.l1_penalty, settings.entropy_penalty)
-    layers = follow_data(initial_layers(settings, rng), x)
     rounds = -(-settings.refinement_steps // _STEPS_PER_ROUND)
-    total = max(settings.epochs + 2 * rounds, 1)
+    # A round on all samples takes about as long as five epochs.
+    total = max(settings.epochs + 5 * rounds, 1)
+
+    layers = follow_data(initial_layers(settings, rng), x)
     for epoch in range(settings.epochs):
         if 0 < epoch <= settings.grid_update_stop and epoch % _EPOCHS_PER_GRID_UPDATE == 0:
             layers = follow_data(layers, x)
         batch = rng.permutation(len(target))[: settings.batch]
-        layers = descend(layers, Loss(layers, x[:, batch], target[batch], penalty), _STEPS_PER_EPOCH)
+        layers = descend(
+            layers, Loss(layers, x[:, batch], target[batch], penalty), _STEPS_PER_EPOCH
+        )
         progress((epoch + 1) / total)
-    layers = solve_last_layer(follow_data(layers, x), x, target)
+
+    candidates = [solve_last_layer(follow_data(layers, x), x, target)]
     for number in range(rounds):
-        directions = gauss_newton_directions(layers, x[:, rng.permutation(len(target))[:_PROBES]])
+        layers = candidates[-1]
+        probes = x[:, rng.permutation(len(target))[:_PROBES]]
         loss = Loss(layers, x, target, _NO_PENALTY)
-        layers = descend(layers, loss, _STEPS_PER_ROUND, directions)
-        layers = solve_last_layer(follow_data(layers, x), x, target)
-        progress((settings.epochs + 2 * (number + 1)) / total)
-    return layers
+        layers = descend(layers, loss, _STEPS_PER_ROUND, gauss_newton_directions(layers, probes))
+        candidates.append(solve_last_layer(follow_data(layers, x), x, target))
+        progress((settings.epochs + 5 * (number + 1)) / total)
+    return min(candidates, key=lambda layers: _mean_square(layers, *validation))
+
+
+def _mean_square(layers: list[TrainableLayer], x: Array, target: Array) -> float:
+    return float(np.mean((forward(layers, x)[0] - target) ** 2))
 
 
 def initial_layers(settings: TrainingSettings, rng: np.random.Generator) -> list[TrainableLayer]:

@@ -13,44 +13,48 @@
 #define RCBF_MAX_OCV_POINTS 64
 #define RCBF_CONSTRAINTS 4
 
-/* Coefficients a1..a10 and delta4 as in bms/barrier/constants.py, computed offline in double. */
+/* Coefficients a1..a10 and delta4 as in bms/barrier/constants.py.
+ *
+ * The thermal constraints subtract temperatures near 300 K and terms that nearly cancel; where
+ * little current is left, the step of float32 at 300 K (3e-5 K) would move the decision by tens of
+ * milliamperes. Their constant terms are therefore double, about twenty operations a decision. */
 typedef struct {
+    double max_core_temperature_K;
+    double max_surface_temperature_K;
+    double alpha2_per_s;
+    double alpha3_per_s2;
+    double a1_per_s;
+    double a4_per_s2;
+    double a6_per_s2;
+    double a10_K_per_Ws2;
+    double delta4_K_per_s2;
+    double core_uncertainty_K_per_s;
+    double core_margin_K_per_s;
+    double surface_margin_K_per_s2;
+    double estimation_error_bound_K;
+    float a2_per_As;
+    float a3_K_per_A2s;
+    float a8_per_As2;
+    float a9_K_per_A2s2;
     float capacity_As;
     float ohmic_resistance_ohm;
     float max_voltage_V;
     float max_soc;
-    float max_core_temperature_K;
-    float max_surface_temperature_K;
     float alpha1_per_s;
-    float alpha2_per_s;
-    float alpha3_per_s2;
-    float a1_per_s;
-    float a2_per_As;
-    float a3_K_per_A2s;
-    float a4_per_s2;
-    float a6_per_s2;
-    float a8_per_As2;
-    float a9_K_per_A2s2;
-    float a10_K_per_Ws2;
-    float delta4_K_per_s2;
     float soc_uncertainty_per_s;
-    float core_uncertainty_K_per_s;
-    float estimation_error_bound_K;
     float voltage_margin_V;
     float soc_margin_per_s;
-    float core_margin_K_per_s;
-    float surface_margin_K_per_s2;
     uint32_t ocv_points;
     float ocv_soc[RCBF_MAX_OCV_POINTS];
     float ocv_V[RCBF_MAX_OCV_POINTS];
 } rcbf_constants_t;
 
 typedef struct {
-    float soc;
-    float core_temperature_K; /* the estimate */
-    float surface_temperature_K;
-    float coolant_temperature_K;
+    double core_temperature_K; /* the estimate */
+    double surface_temperature_K;
+    double coolant_temperature_K;
     float cooling_power_W;
+    float soc;
     float reference_current_A;
 } rcbf_input_t;
 

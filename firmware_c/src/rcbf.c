@@ -5,11 +5,11 @@
 #include "numeric.h"
 
 /* Beyond this no input is physical, and products of inputs could overflow. */
-#define RCBF_INPUT_LIMIT 1e4f
+#define RCBF_INPUT_LIMIT 1e4
 
 /* constant + linear u + quadratic u^2 >= 0 with quadratic <= 0 */
 typedef struct {
-    float constant;
+    double constant;
     float linear;
     float quadratic;
 } concave_t;
@@ -32,50 +32,46 @@ static constraint_t plain(concave_t function)
     return constraint;
 }
 
-static constraint_t with_error(concave_t nominal, float p, float q, float error_bound)
+static constraint_t with_error(concave_t nominal, double p, float q, double error_bound)
 {
     constraint_t constraint = plain(nominal);
+    const float slope = q * (float)error_bound;
     constraint.branch[0].constant -= p * error_bound;
-    constraint.branch[0].linear -= q * error_bound;
+    constraint.branch[0].linear -= slope;
     constraint.branch[1].constant += p * error_bound;
-    constraint.branch[1].linear += q * error_bound;
+    constraint.branch[1].linear += slope;
     return constraint;
 }
 
 static void build(const rcbf_constants_t *k, const rcbf_input_t *in,
                   constraint_t constraints[RCBF_CONSTRAINTS])
 {
-    const float core_K = in->core_temperature_K;
-    const float surface_K = in->surface_temperature_K;
-    const float core_above_surface_K = core_K - surface_K;
+    const double core_K = in->core_temperature_K;
+    const double surface_K = in->surface_temperature_K;
+    const double core_above_surface_K = core_K - surface_K;
+    const float voltage_V = k->max_voltage_V - rcbf_open_circuit_voltage_V(k, in->soc) -
+                            k->voltage_margin_V;
+    const float soc_per_s = k->alpha1_per_s * (k->max_soc - in->soc) - k->soc_uncertainty_per_s -
+                            k->soc_margin_per_s;
 
-    const concave_t voltage = {
-        k->max_voltage_V - rcbf_open_circuit_voltage_V(k, in->soc) - k->voltage_margin_V,
-        k->ohmic_resistance_ohm,
-        0.0f,
-    };
-    const concave_t soc = {
-        k->alpha1_per_s * (k->max_soc - in->soc) - k->soc_uncertainty_per_s - k->soc_margin_per_s,
-        1.0f / k->capacity_As,
-        0.0f,
-    };
+    const concave_t voltage = { (double)voltage_V, k->ohmic_resistance_ohm, 0.0f };
+    const concave_t soc = { (double)soc_per_s, 1.0f / k->capacity_As, 0.0f };
     const concave_t core = {
-        k->a1_per_s * core_above_surface_K +
-            k->alpha2_per_s * (k->max_core_temperature_K - core_K) - k->core_uncertainty_K_per_s -
-            k->core_margin_K_per_s,
-        k->a2_per_As * core_K,
+        k->a1_per_s * core_above_surface_K + k->alpha2_per_s * (k->max_core_temperature_K - core_K) -
+            k->core_uncertainty_K_per_s - k->core_margin_K_per_s,
+        k->a2_per_As * (float)core_K,
         -k->a3_K_per_A2s,
     };
     const concave_t surface = {
         k->a4_per_s2 * core_above_surface_K +
             k->a6_per_s2 * (in->coolant_temperature_K - surface_K) +
             k->alpha3_per_s2 * (k->max_surface_temperature_K - surface_K) +
-            k->a10_K_per_Ws2 * in->cooling_power_W - k->delta4_K_per_s2 -
+            k->a10_K_per_Ws2 * (double)in->cooling_power_W - k->delta4_K_per_s2 -
             k->surface_margin_K_per_s2,
-        k->a8_per_As2 * core_K,
+        k->a8_per_As2 * (float)core_K,
         k->a9_K_per_A2s2,
     };
-    const float e_K = k->estimation_error_bound_K;
+    const double e_K = k->estimation_error_bound_K;
     constraints[0] = plain(voltage);
     constraints[1] = plain(soc);
     constraints[2] = with_error(core, k->a1_per_s - k->alpha2_per_s, k->a2_per_As, e_K);
@@ -86,8 +82,9 @@ static void build(const rcbf_constants_t *k, const rcbf_input_t *in,
 static interval_t admitted(const concave_t *f)
 {
     interval_t interval = { -FLT_MAX, FLT_MAX };
+    const float constant = (float)f->constant;
     if (f->quadratic < 0.0f) {
-        const float discriminant = f->linear * f->linear - 4.0f * f->quadratic * f->constant;
+        const float discriminant = f->linear * f->linear - 4.0f * f->quadratic * constant;
         if (!(discriminant >= 0.0f)) {
             return EMPTY;
         }
@@ -95,14 +92,14 @@ static interval_t admitted(const concave_t *f)
         const float root = sqrtf(discriminant);
         const float sum = -0.5f * (f->linear + ((f->linear < 0.0f) ? -root : root));
         const float first = sum / f->quadratic;
-        const float second = (sum != 0.0f) ? (f->constant / sum) : 0.0f;
+        const float second = (sum != 0.0f) ? (constant / sum) : 0.0f;
         interval.lower = (first < second) ? first : second;
         interval.upper = (first < second) ? second : first;
     } else if (f->linear > 0.0f) {
-        interval.lower = -f->constant / f->linear;
+        interval.lower = -constant / f->linear;
     } else if (f->linear < 0.0f) {
-        interval.upper = -f->constant / f->linear;
-    } else if (!(f->constant >= 0.0f)) {
+        interval.upper = -constant / f->linear;
+    } else if (!(constant >= 0.0f)) {
         interval = EMPTY;
     }
     return interval;
@@ -110,20 +107,17 @@ static interval_t admitted(const concave_t *f)
 
 static float value_at(const concave_t *f, float u)
 {
-    return f->constant + u * (f->linear + u * f->quadratic);
+    return (float)f->constant + u * (f->linear + u * f->quadratic);
 }
 
 static bool is_physical(const rcbf_input_t *in)
 {
-    const float values[] = { in->soc,
-                             in->core_temperature_K,
-                             in->surface_temperature_K,
-                             in->coolant_temperature_K,
-                             in->cooling_power_W,
-                             in->reference_current_A };
+    const double values[] = { in->core_temperature_K,          in->surface_temperature_K,
+                              in->coolant_temperature_K,       (double)in->cooling_power_W,
+                              (double)in->reference_current_A, (double)in->soc };
     bool physical = in->reference_current_A <= 0.0f;
     for (uint32_t i = 0u; i < sizeof values / sizeof values[0]; i++) {
-        physical = physical && (numeric_abs(values[i]) <= RCBF_INPUT_LIMIT);
+        physical = physical && (values[i] <= RCBF_INPUT_LIMIT) && (values[i] >= -RCBF_INPUT_LIMIT);
     }
     return physical;
 }
@@ -181,24 +175,24 @@ float rcbf_open_circuit_voltage_V(const rcbf_constants_t *constants, float soc)
 
 bool rcbf_constants_are_valid(const rcbf_constants_t *k)
 {
-    const float positive[] = { k->capacity_As,        k->ohmic_resistance_ohm,
-                               k->max_voltage_V,      k->max_soc,
-                               k->alpha1_per_s,       k->alpha2_per_s,
-                               k->alpha3_per_s2,      k->max_core_temperature_K,
-                               k->a1_per_s,           k->a3_K_per_A2s,
-                               -k->a9_K_per_A2s2,     k->a10_K_per_Ws2,
-                               k->max_surface_temperature_K };
-    const float not_negative[] = { k->delta4_K_per_s2,          k->soc_uncertainty_per_s,
-                                   k->core_uncertainty_K_per_s, k->estimation_error_bound_K,
-                                   k->voltage_margin_V,         k->soc_margin_per_s,
-                                   k->core_margin_K_per_s,      k->surface_margin_K_per_s2 };
-    bool valid = numeric_is_finite(k->a2_per_As) && numeric_is_finite(k->a4_per_s2) &&
-                 numeric_is_finite(k->a6_per_s2) && numeric_is_finite(k->a8_per_As2);
+    const double positive[] = { (double)k->capacity_As,    (double)k->ohmic_resistance_ohm,
+                                (double)k->max_voltage_V,  (double)k->max_soc,
+                                (double)k->alpha1_per_s,   k->alpha2_per_s,
+                                k->alpha3_per_s2,          k->max_core_temperature_K,
+                                k->a1_per_s,               (double)k->a3_K_per_A2s,
+                                -(double)k->a9_K_per_A2s2, k->a10_K_per_Ws2,
+                                k->max_surface_temperature_K };
+    const double not_negative[] = { k->delta4_K_per_s2,          (double)k->soc_uncertainty_per_s,
+                                    k->core_uncertainty_K_per_s, k->estimation_error_bound_K,
+                                    (double)k->voltage_margin_V, (double)k->soc_margin_per_s,
+                                    k->core_margin_K_per_s,      k->surface_margin_K_per_s2 };
+    bool valid = numeric_is_finite(k->a2_per_As) && numeric_is_finite(k->a8_per_As2) &&
+                 numeric_is_finite((float)k->a4_per_s2) && numeric_is_finite((float)k->a6_per_s2);
     for (uint32_t i = 0u; i < sizeof positive / sizeof positive[0]; i++) {
-        valid = valid && (positive[i] > 0.0f) && (positive[i] <= FLT_MAX);
+        valid = valid && (positive[i] > 0.0) && (positive[i] <= (double)FLT_MAX);
     }
     for (uint32_t i = 0u; i < sizeof not_negative / sizeof not_negative[0]; i++) {
-        valid = valid && (not_negative[i] >= 0.0f) && (not_negative[i] <= FLT_MAX);
+        valid = valid && (not_negative[i] >= 0.0) && (not_negative[i] <= (double)FLT_MAX);
     }
     return valid && (k->ocv_points >= 2u) && (k->ocv_points <= RCBF_MAX_OCV_POINTS) &&
            numeric_rises(k->ocv_soc, k->ocv_points) && numeric_rises(k->ocv_V, k->ocv_points);

@@ -9,10 +9,9 @@ from typing import Annotated
 
 import typer
 
-from bms.errors import InputError
 from bms.firmware import Ecu
 from bms.presets import DEFAULT_PRESET
-from hil_sim.bus import is_private, open_bus
+from hil_sim.bus import open_bus, require_shared
 from hil_sim.clock import WallClock
 from hil_sim.nodes.ecu import EcuNode
 
@@ -27,7 +26,7 @@ def ecu(
     ] = DEFAULT_PRESET,
     model: Annotated[
         Path | None,
-        typer.Option("--model", help="JSON model of the estimator.  [default: the preset's own]"),
+        typer.Option("--model", help="JSON model of the estimator. Default: the preset's own."),
     ] = None,
     realtime: Annotated[
         bool,
@@ -44,11 +43,7 @@ def ecu(
 
     Example: bms ecu --bus socketcan:vcan0 --silence-s 10
     """
-    if is_private(bus):
-        raise InputError(
-            f"bus '{bus}': reaches parties in one process only; use 'bms sil', "
-            "or a bus such as socketcan:vcan0 for two processes"
-        )
+    require_shared(bus)
     firmware = Ecu(preset=preset, model=model)
     stop = Event()
     for number in (signal.SIGTERM, signal.SIGINT):

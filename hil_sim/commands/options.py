@@ -15,7 +15,7 @@ PresetOption = Annotated[
 ]
 ModelOption = Annotated[
     Path | None,
-    typer.Option("--model", help="JSON model of the estimator.  [default: the preset's own]"),
+    typer.Option("--model", help="JSON model of the estimator. Default: the preset's own."),
 ]
 BusOption = Annotated[
     str,
@@ -40,8 +40,8 @@ OutOption = Annotated[
     Path | None,
     typer.Option(
         "--out",
-        help="Folder for summary.json, report.html, charge.png and can.log.  "
-        "[default: nothing is written]",
+        help="Folder for summary.json, report.html, charge.png and can.log. "
+        "Default: nothing is written.",
     ),
 ]
 JsonOption = Annotated[

@@ -91,6 +91,7 @@ class PlantNode:
         self._states = database["ChargeCommand"].choices["CommandState"]
         self._constraints = database["Decision"].choices["ActiveConstraint"]
         self._connected = False
+        self._is_answer_late = False
 
     def exchange(self, period: int, readings: Readings, request: Request) -> Answer:
         """Publish what is measured and wanted in a period, and return what the ECU answers.
@@ -100,6 +101,7 @@ class PlantNode:
         when none comes.
         """
         frames = self._frames(readings, request)
+        late = self._late_frames(period) if self._is_answer_late else []
         for _ in range(CONNECT_ATTEMPTS):
             sent_s = self._turn.time_s(period)
             for frame in frames:
@@ -115,12 +117,22 @@ class PlantNode:
             raise BusError(
                 f"bus '{self._bus.name}': no ECU answers; start 'bms ecu --bus {self._bus.name}'"
             )
+        self._is_answer_late = self._last_id not in (frame.frame_id for _, frame in heard)
         if self._recorder is not None:
+            for time_s, frame in late:
+                self._recorder.record(time_s, frame, received=True)
             for frame in frames:
                 self._recorder.record(sent_s, frame, received=False)
             for time_s, frame in heard:
                 self._recorder.record(time_s, frame, received=True)
         return self._answer([frame for _, frame in heard])
+
+    def _late_frames(self, period: int) -> list[tuple[float, Frame]]:
+        """What came too late for the last period; it must not pass for an answer to this one."""
+        late = []
+        while (frame := self._bus.receive(0.0)) is not None:
+            late.append((self._turn.time_s(period), frame))
+        return late
 
     def _frames(self, readings: Readings, request: Request) -> list[Frame]:
         frames = [

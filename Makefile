@@ -1,0 +1,57 @@
+# `make run` and `make test` do all their set-up themselves; see `make help`.
+PYTHON ?= python3
+OUT ?= out/run
+
+BIN := .venv/bin
+SOURCES := $(wildcard firmware_c/*/*.[ch]) bms/firmware/build.py setup.py
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+C_WARNINGS := -std=c99 -pedantic -Wall -Wextra -Werror -Wconversion -Wdouble-promotion -Wmissing-prototypes
+C_INCLUDES := -Ifirmware_c/include -Ifirmware_c/src -Ifirmware_c/generated
+
+.PHONY: help run test lint generate models fit clean
+.DEFAULT_GOAL := help
+
+help: ## List the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+run: .venv/runtime ## Charge a cell at 10C over a CAN bus and write a report to out/run
+	$(BIN)/bms sil --baseline s-cbf --out $(OUT)
+
+test: .venv/tests build/sanitized/done lint ## Everything that must pass, real vcan and sanitizers included
+	$(BIN)/python -m pytest -n 2
+	tools/sanitized_tests.sh
+
+lint: .venv/tests ## Types, style and C warnings
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	for source in firmware_c/src/*.c firmware_c/generated/*.c; do \
+	  $(CC) $(C_WARNINGS) $(C_INCLUDES) -fsyntax-only $$source || exit 1; done
+
+generate: .venv/runtime ## Write firmware_c/generated anew from preset, model and CAN database
+	$(BIN)/python -m codegen
+
+models: .venv/runtime ## Train the shipped models anew (both presets) and generate the tables
+	for preset in paper_calibrated lin2014; do \
+	  $(BIN)/bms train --preset $$preset --out bms/models/$$preset.json || exit 1; done
+	$(BIN)/python -m codegen
+
+clean: ## Remove everything that set-up, build and runs have made
+	rm -rf .venv build out *.egg-info bms/firmware/_firmware.*
+
+.venv/runtime: pyproject.toml constraints.txt $(SOURCES)
+	tools/check_machine.sh $(PYTHON)
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(INSTALL) setuptools wheel cffi
+	$(INSTALL) --no-build-isolation --editable .
+	touch $@
+
+.venv/tests: .venv/runtime tools/debian_packages.sh
+	tools/debian_packages.sh
+	$(INSTALL) --no-build-isolation --editable '.[test]'
+	touch $@
+
+build/sanitized/done: .venv/tests $(SOURCES)
+	rm -rf build/sanitized
+	$(BIN)/python -m bms.firmware.build --sanitize --out build/sanitized
+	touch $@

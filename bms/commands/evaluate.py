@@ -1,0 +1,86 @@
+"""`bms evaluate`: errors of a model on data that it was not trained on."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from bms.data.datasets import simulated_split
+from bms.data.measurements import read_measurements
+from bms.data.simulate import Samples, joined
+from bms.errors import InputError
+from bms.kan.accuracy import error_figures
+from bms.kan.basis import Array, Mask
+from bms.kan.model_file import KanModel, load_model
+from bms.presets import load_preset
+from bms.tables.calibration_block import check_pair
+
+
+class Engine(str, Enum):
+    """What computes the estimate."""
+
+    C = "c"
+    PYTHON = "python"
+
+
+def evaluate(
+    model: Annotated[Path, typer.Option("--model", help="Model to evaluate (JSON).")],
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            "--data", help="CSV: time_s, current_A, ..., core_temperature_K (s, A, W, K)."
+        ),
+    ] = None,
+    preset: Annotated[
+        str | None, typer.Option("--preset", help="Simulate new profiles from it.")
+    ] = None,
+    engine: Annotated[
+        Engine, typer.Option("--engine", help="c is the firmware's float32; python is double.")
+    ] = Engine.C,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+) -> None:
+    """Print the errors (K) of the estimated core temperature over all samples.
+
+    Extrapolated samples lie out of the trained domain; they are counted and included. With
+    --preset the profiles are new ones, neither trained on nor used for the error bound.
+
+    Example: bms evaluate --model model.json --preset paper_calibrated --json
+    """
+    if (preset is None) == (data is None):
+        raise InputError("evaluate: give either --preset NAME or --data CSV")
+    loaded = load_model(model)
+    if data is not None:
+        samples = read_measurements(data).samples()
+    else:
+        assert preset is not None
+        chosen = load_preset(preset)
+        check_pair(chosen, loaded)
+        seed = loaded.training.settings.seed
+        samples = joined(simulated_split(chosen, "evaluation", seed).values())
+    estimate_K, in_domain = _estimate(loaded, samples, engine)
+    figures = error_figures(estimate_K, samples.core_temperature_K)
+    result = {**asdict(figures), "extrapolated_samples": int(np.count_nonzero(~in_domain))}
+    if as_json:
+        typer.echo(json.dumps(result, indent=1))
+    else:
+        table = Table("figure", "value", title=f"{model}, engine {engine.value}")
+        for name, value in result.items():
+            table.add_row(name, f"{value:.4f}" if isinstance(value, float) else str(value))
+        Console().print(table)
+
+
+def _estimate(model: KanModel, samples: Samples, engine: Engine) -> tuple[Array, Mask]:
+    if engine is Engine.PYTHON:
+        return model.network.evaluate(samples.inputs)
+    # Imported here, so that the Python engine works where the firmware is not compiled.
+    from bms.firmware import CompiledNetwork  # noqa: PLC0415
+
+    return CompiledNetwork(model).evaluate(samples.inputs)

@@ -1,0 +1,114 @@
+"""`bms train`: a model from a preset or from measurements."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from bms.errors import InputError
+from bms.kan.build import model_for_measurements, model_for_preset
+from bms.kan.model_file import KanModel, save_model
+from bms.kan.settings import TrainingSettings
+from bms.presets import load_preset
+from bms.validation import parse
+
+DEFAULTS = TrainingSettings()
+
+
+def train(
+    out: Annotated[Path, typer.Option("--out", help="Model to write (JSON).")],
+    preset: Annotated[
+        str | None, typer.Option("--preset", help="Simulate the data from it: name or .toml file.")
+    ] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            "--data", help="CSV: time_s, current_A, ..., core_temperature_K (s, A, W, K)."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of data and training.")] = DEFAULTS.seed,
+    width: Annotated[
+        str, typer.Option("--width", help="Nodes of inputs and layers, such as 4,1,1.")
+    ] = "4,1,1",
+    grid: Annotated[int, typer.Option("--grid", help="Grid intervals G.")] = DEFAULTS.grid,
+    degree: Annotated[int, typer.Option("--degree", help="Spline degree k.")] = DEFAULTS.degree,
+    epochs: Annotated[int, typer.Option("--epochs", help="Penalised epochs.")] = DEFAULTS.epochs,
+    refinement_steps: Annotated[
+        int, typer.Option("--refinement-steps", help="L-BFGS steps without penalties afterwards.")
+    ] = DEFAULTS.refinement_steps,
+) -> None:
+    """Train the estimator of the core temperature (K) and write it with its errors.
+
+    With --preset the data are simulated constant and dynamic charging profiles, split by whole
+    profiles; with --data they are measurements, the first two thirds of them for training.
+
+    Example: bms train --preset paper_calibrated --out model.json
+    """
+    if (preset is None) == (data is None):
+        raise InputError("train: give either --preset NAME or --data CSV")
+    settings = _settings(
+        seed=seed,
+        width=_numbers(width),
+        grid=grid,
+        degree=degree,
+        epochs=epochs,
+        refinement_steps=refinement_steps,
+    )
+    _require_writable(out)
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True) as bar:
+        task = bar.add_task("Training", total=1.0)
+
+        def progress(share: float) -> None:
+            bar.update(task, completed=share)
+
+        if data is not None:
+            model = model_for_measurements(data, settings, progress)
+        else:
+            assert preset is not None
+            model = model_for_preset(load_preset(preset), settings, progress)
+    save_model(model, out)
+    Console().print(_table(model, out))
+
+
+def _settings(**values: object) -> TrainingSettings:
+    return parse(TrainingSettings, values, "train")
+
+
+def _numbers(text: str) -> list[int]:
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"--width: '{text}' is not a list of numbers such as 4,1,1") from None
+
+
+def _require_writable(out: Path) -> None:
+    """Fail before the training rather than after it."""
+    if out.is_dir() or not os.access(out.parent, os.W_OK):
+        raise InputError(f"{out}: cannot be written; choose a file in a folder that can")
+
+
+def _table(model: KanModel, out: Path) -> Table:
+    bound_K = model.error_bound_K
+    table = Table(title=f"{out}: model {model.hash[:8]}, error bound {bound_K:.4f} K")
+    for heading in ("split", "profiles", "RMSE K", "largest K", "bias K", "samples"):
+        table.add_column(heading, justify="right")
+    for split, errors in model.errors.items():
+        kinds = {"constant": errors.constant, "dynamic": errors.dynamic, "all": errors.overall}
+        for kind, figures in kinds.items():
+            if figures is not None:
+                table.add_row(
+                    split,
+                    kind,
+                    f"{figures.rmse_K:.4f}",
+                    f"{figures.max_abs_error_K:.4f}",
+                    f"{figures.bias_K:+.4f}",
+                    str(figures.samples),
+                )
+    return table

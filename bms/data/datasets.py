@@ -1,0 +1,36 @@
+"""Splits of simulated data by whole profiles: no profile has samples in two splits."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from bms.data.profiles import KINDS, Kind, draw_profiles
+from bms.data.simulate import Samples, simulate
+from bms.presets import Preset
+
+Split = Literal["training", "validation", "test", "evaluation"]
+_SPLITS: tuple[Split, ...] = ("training", "validation", "test", "evaluation")
+
+PROFILES_OF_EACH_KIND: dict[Split, int] = {
+    "training": 100,
+    "validation": 30,
+    "test": 60,
+    "evaluation": 60,
+}
+
+
+def simulated_split(
+    preset: Preset, split: Split, seed: int, count: int | None = None
+) -> dict[Kind, Samples]:
+    """Constant and dynamic profiles of one split, `count` of each kind (None: as shipped).
+
+    Every pair of seed and split has its own random stream; "evaluation" is used nowhere in
+    training, so that `bms evaluate` shows profiles that not even e_max was read from.
+    """
+    profiles = PROFILES_OF_EACH_KIND[split] if count is None else count
+    rng = np.random.default_rng([seed, _SPLITS.index(split)])
+    return {
+        kind: simulate(preset, draw_profiles(preset, kind, profiles, rng), rng) for kind in KINDS
+    }

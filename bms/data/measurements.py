@@ -1,0 +1,87 @@
+"""Measured data from CSV files."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from bms.data.profiles import Array
+from bms.data.simulate import Samples
+from bms.errors import InputError
+from bms.validation import read_text
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """A recording, all arrays of shape (N,); the current is negative while charging."""
+
+    time_s: Array
+    current_A: Array
+    cooling_power_W: Array
+    surface_temperature_K: Array
+    coolant_temperature_K: Array
+    core_temperature_K: Array
+
+    def samples(self) -> Samples:
+        """The recording as samples of one profile, inputs in the estimator's order."""
+        inputs = np.stack(
+            [
+                self.current_A,
+                self.cooling_power_W,
+                self.surface_temperature_K,
+                self.coolant_temperature_K,
+            ],
+            axis=1,
+        )
+        return Samples(inputs, self.core_temperature_K, np.zeros(len(inputs), dtype=np.int64))
+
+
+COLUMNS = tuple(field.name for field in fields(Measurements))
+
+
+def read_measurements(path: Path) -> Measurements:
+    """Recording from a CSV file with a header row; columns beyond the six are ignored.
+
+    Raises InputError, with file and line, for a missing column, a row of another length, text or
+    a value that is not finite in place of a number, and time that does not rise.
+    """
+    rows = csv.reader(read_text(path).lstrip("\ufeff").splitlines())
+    header = [name.strip() for name in next(rows, [])]
+    missing = [name for name in COLUMNS if header.count(name) != 1]
+    if missing:
+        raise InputError(
+            f"{path}:1: column {missing[0]} must be there once; "
+            f"give a CSV file with the columns {', '.join(COLUMNS)}"
+        )
+    places = [header.index(name) for name in COLUMNS]
+    values: list[list[float]] = []
+    for cells in rows:
+        if not cells:
+            continue
+        where = f"{path}:{rows.line_num}"
+        if len(cells) != len(header):
+            raise InputError(
+                f"{where}: {len(cells)} values where the header has {len(header)}; mend the row"
+            )
+        values.append([_number(cells[place], header[place], where) for place in places])
+        if len(values) > 1 and values[-1][0] <= values[-2][0]:
+            raise InputError(f"{where}: time_s must rise from row to row; sort the file by time")
+    if not values:
+        raise InputError(f"{path}: holds no measurement; give a file with at least one row")
+    return Measurements(*np.array(values).T.copy())
+
+
+def _number(text: str, name: str, where: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(
+            f"{where}: {name}: {text.strip()!r} is not a finite number; mend or remove the row"
+        )
+    return value

@@ -1,0 +1,147 @@
+"""From data to a finished model: training, errors on every split, error bound."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from bms.barrier.margins import BusQuantisation
+from bms.data.datasets import PROFILES_OF_EACH_KIND, Split, simulated_split
+from bms.data.measurements import read_measurements
+from bms.data.simulate import Samples, joined
+from bms.errors import InputError
+from bms.kan.accuracy import ARITHMETIC_K, error_figures, measurement_error_K
+from bms.kan.basis import Array
+from bms.kan.model_file import (
+    FORMAT_VERSION,
+    ErrorFigures,
+    KanModel,
+    SplitErrors,
+    TrainingRecord,
+)
+from bms.kan.network import Network
+from bms.kan.settings import TrainingSettings
+from bms.kan.training import Ranges, train_network
+from bms.presets import Preset
+
+Progress = Callable[[float], None]
+
+_TRAINING_SHARE = 2.0 / 3.0
+_BOX_MARGIN = 0.1
+_SMALLEST_HALF_RANGE = 0.5
+_FEWEST_ROWS = 100
+
+
+def model_for_preset(
+    preset: Preset,
+    settings: TrainingSettings,
+    progress: Progress,
+    counts: Mapping[Split, int] = PROFILES_OF_EACH_KIND,
+) -> KanModel:
+    """Model trained on profiles simulated from the preset; `counts` are profiles of each kind."""
+    splits: tuple[Split, ...] = ("training", "validation", "test")
+    data = {split: simulated_split(preset, split, settings.seed, counts[split]) for split in splits}
+    samples = {split: joined(kinds.values()) for split, kinds in data.items()}
+    network = train_network(
+        samples["training"],
+        samples["validation"],
+        preset.operating_box.ranges(),
+        settings,
+        progress,
+    )
+    errors: dict[str, SplitErrors] = {
+        split: SplitErrors(
+            overall=_figures(network, samples[split]),
+            constant=_figures(network, kinds["constant"]),
+            dynamic=_figures(network, kinds["dynamic"]),
+        )
+        for split, kinds in data.items()
+    }
+    test_inputs = samples["test"].inputs
+    return _model(
+        network,
+        TrainingRecord(
+            settings,
+            f"simulated from preset {preset.name}",
+            None,
+            {split: 2 * counts[split] for split in splits},
+        ),
+        errors,
+        {"sensors": measurement_error_K(network, test_inputs, preset.sensors, BusQuantisation())},
+        preset,
+    )
+
+
+def model_for_measurements(path: Path, settings: TrainingSettings, progress: Progress) -> KanModel:
+    """Model trained on the first two thirds of a recording and tested on the last third.
+
+    The box spans the first two thirds and a tenth of their half range on either side. The error
+    bound is that of the last third; the noise of the sensors is part of it already.
+    Raises InputError when the file cannot be used or is too short.
+    """
+    recording = read_measurements(path).samples()
+    rows = len(recording.core_temperature_K)
+    if rows < _FEWEST_ROWS:
+        raise InputError(f"{path}: {rows} rows; training needs at least {_FEWEST_ROWS}")
+    cut = round(_TRAINING_SHARE * rows)
+    training, test = _rows(recording, slice(cut)), _rows(recording, slice(cut, None))
+    network = train_network(training, training, _box(training.inputs), settings, progress)
+    return _model(
+        network,
+        TrainingRecord(
+            settings,
+            path.name,
+            hashlib.sha256(path.read_bytes()).hexdigest(),
+            {"training": 1, "test": 1},
+        ),
+        {
+            "training": SplitErrors(_figures(network, training)),
+            "test": SplitErrors(_figures(network, test)),
+        },
+        {},
+        None,
+    )
+
+
+def _model(
+    network: Network,
+    record: TrainingRecord,
+    errors: dict[str, SplitErrors],
+    further_bounds_K: dict[str, float],
+    preset: Preset | None,
+) -> KanModel:
+    parts_K = {
+        "held_out_profiles": errors["test"].overall.max_abs_error_K,
+        **further_bounds_K,
+        "arithmetic": ARITHMETIC_K,
+    }
+    return KanModel(
+        FORMAT_VERSION,
+        network,
+        None if preset is None else preset.name,
+        None if preset is None else preset.training_hash,
+        record,
+        errors,
+        math.fsum(parts_K.values()),
+        parts_K,
+    )
+
+
+def _figures(network: Network, samples: Samples) -> ErrorFigures:
+    return error_figures(network.evaluate(samples.inputs)[0], samples.core_temperature_K)
+
+
+def _rows(samples: Samples, rows: slice) -> Samples:
+    return Samples(samples.inputs[rows], samples.core_temperature_K[rows], samples.profile[rows])
+
+
+def _box(inputs: Array) -> Ranges:
+    low, high = inputs.min(axis=0), inputs.max(axis=0)
+    # A channel that does not vary, such as no cooling, still needs a range around its value.
+    half = np.maximum((0.5 + _BOX_MARGIN / 2) * (high - low), _SMALLEST_HALF_RANGE)
+    center = 0.5 * (low + high)
+    return tuple(zip((center - half).tolist(), (center + half).tolist()))

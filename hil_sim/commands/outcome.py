@@ -1,0 +1,81 @@
+"""What the charging commands have in common: run, show, write, exit code."""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, Protocol
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from hil_sim.recorder import Recorder
+from hil_sim.report.files import summary_json, write_report
+from hil_sim.report.folder import OutputFolder
+from hil_sim.report.table import print_table
+from hil_sim.result import RunResult
+from hil_sim.session import Settings
+
+
+class Run(Protocol):
+    """A way to run a charge."""
+
+    def __call__(
+        self, settings: Settings, recorder: Recorder | None = None, progress: Any = ...
+    ) -> RunResult:
+        """Run to the end."""
+        ...
+
+
+def charge_and_report(
+    settings: Settings,
+    run: Run,
+    out: Path | None,
+    as_json: bool,
+    baseline: Settings | None = None,
+) -> int:
+    """Run a charge, and a baseline beside it; print and write what came of it.
+
+    Returns the exit code: 1 when the controller, not the baseline, failed its check. Raises
+    InputError before the run when the folder cannot be written.
+    """
+    with ExitStack() as stack:
+        folder = stack.enter_context(OutputFolder(out)) if out is not None else None
+        with ExitStack() as during_run:
+            recorder = None
+            if folder is not None:
+                recorder = during_run.enter_context(Recorder(folder.path("can.log")))
+            results = [_with_progress(settings, run, recorder, as_json)]
+        if baseline is not None:
+            results.append(_with_progress(baseline, run, None, as_json))
+        if folder is not None:
+            write_report(folder, settings, results)
+            folder.commit()
+    if as_json:
+        print(json.dumps(summary_json(results), indent=2))
+    else:
+        print_table(Console(), settings, results, out)
+    return EXIT_DONE if results[0].summary.passed else EXIT_CHECK_FAILED
+
+
+def _with_progress(
+    settings: Settings, run: Run, recorder: Recorder | None, quiet: bool
+) -> RunResult:
+    """Run with a bar of the state of charge on a terminal."""
+    if quiet or not sys.stderr.isatty():
+        return run(settings, recorder)
+    start = settings.preset.initial.soc
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("state of charge {task.percentage:.0f} %"),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    ) as bar:
+        task = bar.add_task(settings.controller.value, total=1.0)
+        bar.update(task, completed=start)
+        return run(settings, recorder, lambda soc: bar.update(task, completed=soc))

@@ -1,0 +1,1 @@
+"""What a user sees of a run: table, chart, page, files."""

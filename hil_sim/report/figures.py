@@ -1,0 +1,80 @@
+"""The figures of a run that a reader compares with limits and with other runs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from bms.presets.schema import Limits
+from hil_sim.result import CHARGING_STATES, RunResult, Summary
+
+
+class Figure(NamedTuple):
+    """One line: what, one text for each run, the limit as text, and for each run whether kept."""
+
+    name: str
+    values: list[str]
+    limit: str
+    kept: list[bool | None]
+
+
+def figures(limits: Limits, results: list[RunResult]) -> list[Figure]:
+    """Lines of the table, limits first."""
+    summaries = [result.summary for result in results]
+    lines = [
+        _limited(
+            "Peak core temperature",
+            "max_core_temperature_K",
+            limits.max_core_temperature_K,
+            "{:.2f} K",
+            summaries,
+        ),
+        _limited(
+            "Peak surface temperature",
+            "max_surface_temperature_K",
+            limits.max_surface_temperature_K,
+            "{:.2f} K",
+            summaries,
+        ),
+        _limited("Peak voltage", "max_voltage_V", limits.max_voltage_V, "{:.3f} V", summaries),
+        _limited("Peak state of charge", "max_soc", limits.max_soc, "{:.4f}", summaries),
+    ]
+    free = (
+        ("State of charge at the end", "final_soc", "{:.4f}"),
+        ("Charging time", "charge_time_s", "{:.1f} s"),
+        ("First derating after", "first_derate_s", "{:.1f} s"),
+        ("Core estimate: RMS error", "kan_rmse_K", "{:.4f} K"),
+        ("Core estimate: largest error", "kan_max_abs_error_K", "{:.3f} K"),
+        ("Core estimate: error bound", "error_bound_K", "{:.3f} K"),
+        ("Control periods", "steps", "{}"),
+        ("Control periods without safe current", "infeasible_steps", "{}"),
+        ("End of the run", "stop_reason", "{}"),
+        ("Wall-clock time", "wall_time_s", "{:.2f} s"),
+    )
+    for name, key, pattern in free:
+        values = [_text(getattr(summary, key), pattern) for summary in summaries]
+        lines.append(Figure(name, values, "", [None] * len(values)))
+    return lines
+
+
+def _limited(name: str, key: str, limit: float, pattern: str, summaries: list[Summary]) -> Figure:
+    values = [float(getattr(summary, key)) for summary in summaries]
+    return Figure(
+        name,
+        [pattern.format(value) for value in values],
+        pattern.format(limit),
+        [value <= limit for value in values],
+    )
+
+
+def _text(value: object, pattern: str) -> str:
+    return "–" if value is None else pattern.format(value)
+
+
+def seconds_by_constraint(result: RunResult, period_s: float) -> dict[str, float]:
+    """Time in s of the charge during which each constraint decided the current."""
+    charging = [
+        active
+        for state, active in zip(result.series.state, result.series.active_constraint)
+        if state in CHARGING_STATES and active is not None
+    ]
+    return {name: charging.count(name) * period_s for name in dict.fromkeys(charging)}

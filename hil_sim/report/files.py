@@ -1,0 +1,68 @@
+"""Writes the files of a run: summary.json, charge.png, report.html (can.log grows meanwhile)."""
+
+from __future__ import annotations
+
+import base64
+import json
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from bms import __version__
+from hil_sim.report.chart import charge_chart, estimate_chart
+from hil_sim.report.figures import figures, seconds_by_constraint
+from hil_sim.report.folder import OutputFolder
+from hil_sim.result import RunResult
+from hil_sim.session import Settings
+
+
+def summary_json(results: list[RunResult]) -> dict[str, Any]:
+    """Summary of the controller, with that of a baseline under `baseline`."""
+    content = results[0].summary.to_json()
+    if len(results) > 1:
+        content["baseline"] = results[1].summary.to_json()
+    return content
+
+
+def write_report(folder: OutputFolder, settings: Settings, results: list[RunResult]) -> None:
+    """Write summary, chart and page of a controller and, when there is one, a baseline."""
+    chart = charge_chart(settings.preset.limits, results)
+    folder.path("charge.png").write_bytes(chart)
+    text = json.dumps(summary_json(results), indent=2) + "\n"
+    folder.path("summary.json").write_text(text, encoding="utf-8")
+    page = report_page(settings, results, chart)
+    folder.path("report.html").write_text(page, encoding="utf-8")
+
+
+def report_page(settings: Settings, results: list[RunResult], chart: bytes) -> str:
+    """The self-contained HTML page of a run."""
+    environment = Environment(
+        loader=PackageLoader("hil_sim", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    preset, first = settings.preset, results[0].summary
+    has_estimate = first.kan_rmse_K is not None
+    return environment.get_template("report.html.j2").render(
+        version=__version__,
+        settings=settings,
+        preset=preset,
+        results=results,
+        first=first,
+        figures=figures(preset.limits, results),
+        deciding=[
+            (result.summary.controller, name, time_s)
+            for result in results
+            for name, time_s in seconds_by_constraint(
+                result, preset.timing.sampling_period_s
+            ).items()
+        ],
+        chart=_data_url(chart),
+        estimate_chart=_data_url(estimate_chart(results[0])) if has_estimate else None,
+    )
+
+
+def _data_url(png: bytes) -> str:
+    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")

@@ -1,0 +1,38 @@
+"""The short table on the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from hil_sim.report.figures import figures
+from hil_sim.result import RunResult
+from hil_sim.session import Settings
+
+
+def print_table(
+    console: Console, settings: Settings, results: list[RunResult], out: Path | None
+) -> None:
+    """Figures of each run beside their limits, the verdict, and where the report lies."""
+    preset, first = settings.preset, results[0].summary
+    table = Table(title=f"Charge of '{preset.name}' over {settings.bus}", title_justify="left")
+    table.add_column("")
+    for result in results:
+        table.add_column(result.summary.controller, justify="right")
+    table.add_column("limit", justify="right")
+    for line in figures(preset.limits, results):
+        cells = [
+            f"[red]{text}[/red]" if kept is False else text
+            for text, kept in zip(line.values, line.kept)
+        ]
+        table.add_row(line.name, *cells, line.limit)
+    console.print(table)
+    if first.passed:
+        console.print(f"{first.controller}: every limit kept at every sub-step of the plant")
+    else:
+        reasons = [*first.violations, f"run ended by {first.stop_reason}"]
+        console.print(f"[red]{first.controller}: check failed: {'; '.join(reasons)}[/red]")
+    if out is not None:
+        console.print(f"report: {out / 'report.html'}", soft_wrap=True)

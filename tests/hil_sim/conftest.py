@@ -1,0 +1,21 @@
+"""What several files of tests need."""
+
+import pytest
+
+from bms.presets import Preset, load_preset, preset_names
+from hil_sim.database import MessageCodec, load_database
+
+
+@pytest.fixture(scope="session")
+def preset() -> Preset:
+    return load_preset("paper_calibrated")
+
+
+@pytest.fixture(params=preset_names(), scope="session")
+def any_preset(request: pytest.FixtureRequest) -> Preset:
+    return load_preset(request.param)
+
+
+@pytest.fixture(scope="session")
+def database() -> dict[str, MessageCodec]:
+    return load_database()
