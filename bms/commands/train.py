@@ -74,7 +74,8 @@ def train(
             assert preset is not None
             model = model_for_preset(load_preset(preset), settings, progress)
     save_model(model, out)
-    Console().print(_table(model, out))
+    typer.echo(f"{out}: model {model.hash[:8]}, error bound {model.error_bound_K:.4f} K")
+    Console().print(_table(model))
 
 
 def _settings(**values: object) -> TrainingSettings:
@@ -90,13 +91,12 @@ def _numbers(text: str) -> list[int]:
 
 def _require_writable(out: Path) -> None:
     """Fail before the training rather than after it."""
-    if out.is_dir() or not os.access(out.parent, os.W_OK):
+    if out.is_dir() or not out.parent.is_dir() or not os.access(out.parent, os.W_OK):
         raise InputError(f"{out}: cannot be written; choose a file in a folder that can")
 
 
-def _table(model: KanModel, out: Path) -> Table:
-    bound_K = model.error_bound_K
-    table = Table(title=f"{out}: model {model.hash[:8]}, error bound {bound_K:.4f} K")
+def _table(model: KanModel) -> Table:
+    table = Table()
     for heading in ("split", "profiles", "RMSE K", "largest K", "bias K", "samples"):
         table.add_column(heading, justify="right")
     for split, errors in model.errors.items():

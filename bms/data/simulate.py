@@ -63,6 +63,8 @@ def simulate(preset: Preset, profiles: Profiles, rng: np.random.Generator) -> Sa
         )
         low, high = np.transpose(box.ranges())
         alive &= np.all((inputs >= low) & (inputs <= high), axis=1) & (state.soc <= 1.0)
+        if not alive.any():
+            break
         rows.append(inputs[alive])
         cores.append(state.core_temperature_K[alive])
         numbers.append(np.flatnonzero(alive))

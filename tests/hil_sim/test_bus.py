@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from bms.errors import BusError, InputError
 from hil_sim.bus import Frame, open_bus, require_shared
 
+
 @pytest.fixture
 def pair(request):
     name = f"virtual:{request.node.name}"

@@ -12,9 +12,7 @@ from hypothesis import strategies as st
 from hil_sim.database import load_database
 from hil_sim.e2e import Receiver, Sender
 
-ORACLE = cantools.database.load_string(
-    files("codegen").joinpath("can/bms.dbc").read_text(), "dbc"
-)
+ORACLE = cantools.database.load_string(files("codegen").joinpath("can/bms.dbc").read_text(), "dbc")
 CODECS = load_database()
 PROTECTED = [name for name, codec in CODECS.items() if codec.data_ids]
 ANALOGUE = [

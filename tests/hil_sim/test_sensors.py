@@ -54,7 +54,11 @@ def test_readings_lie_on_the_grid_of_the_resolution(truth, seed):
 
 def test_a_perfect_sensor_returns_the_truth():
     assert suite(Sensor(0.0, 0.0, 0.0)).read(Readings(1.5, 2.5, 3.5, 4.5, 5.5)) == (
-        1.5, 2.5, 3.5, 4.5, 5.5,
+        1.5,
+        2.5,
+        3.5,
+        4.5,
+        5.5,
     )
 
 

@@ -1,0 +1,135 @@
+"""A model file is written whole, read back bit for bit, and refused when it is not what it says."""
+
+import dataclasses
+import json
+import math
+
+import pytest
+
+from bms.errors import InputError
+from bms.kan.model_file import (
+    ErrorFigures,
+    KanModel,
+    SplitErrors,
+    TrainingRecord,
+    load_model,
+    load_shipped_model,
+    save_model,
+)
+from bms.kan.settings import TrainingSettings
+from bms.presets import load_preset, preset_names
+from tests.bms.kan_samples import random_network
+
+
+@pytest.fixture
+def model():
+    figures = ErrorFigures(0.1, 0.3, -0.01, 500)
+    return KanModel(
+        1,
+        random_network(),
+        "some",
+        "ab12",
+        TrainingRecord(TrainingSettings(), "simulated", None, {"test": 1}),
+        {"test": SplitErrors(figures, figures, None)},
+        0.4,
+        {"held_out_profiles": 0.3, "sensors": 0.1},
+    )
+
+
+def rewritten(path, change):
+    content = json.loads(path.read_text())
+    change(content)
+    path.write_text(json.dumps(content))
+
+
+def test_model_comes_back_as_it_was_and_twice_in_the_same_bytes(model, tmp_path):
+    save_model(model, tmp_path / "a.json")
+    save_model(load_model(tmp_path / "a.json"), tmp_path / "b.json")
+
+    assert load_model(tmp_path / "b.json") == model
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+    assert json.loads((tmp_path / "a.json").read_text())["hash"] == model.hash
+
+
+def test_hash_changes_with_the_last_bit_of_one_coefficient(model):
+    edge = model.network.layers[0][0][0]
+    nudged = dataclasses.replace(edge, base_weight=math.nextafter(edge.base_weight, 9.0))
+    layer = ((nudged, *model.network.layers[0][0][1:]), *model.network.layers[0][1:])
+    network = dataclasses.replace(model.network, layers=(layer, *model.network.layers[1:]))
+
+    assert dataclasses.replace(model, network=network).hash != model.hash
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda c: c["errors"]["test"]["overall"].update(rmse_K=0.01), "hash"),
+        (lambda c: c.pop("hash"), "hash"),
+        (lambda c: c.pop("network"), "network"),
+        (lambda c: c.update(format_version=2), "format_version"),
+        (lambda c: c.update(colour="red"), "colour"),
+        (lambda c: c["network"].update(degree="3"), "network.degree"),
+        (lambda c: c["network"].update(output_center_K=math.nan), "network.output_center_K"),
+        (lambda c: c["network"]["input_half_range"].__setitem__(0, 0.0), "input_half_range.0"),
+        (lambda c: c["error_bound_parts_K"].update(sensors=0.0), "error_bound_K"),
+        (lambda c: c["network"]["layers"][0][0].pop(), "layers"),
+    ],
+)
+def test_stale_or_malformed_file_is_refused_by_name_and_key(model, tmp_path, change, told):
+    path = tmp_path / "model.json"
+    save_model(model, path)
+    rewritten(path, change)
+
+    with pytest.raises(InputError) as error:
+        load_model(path)
+
+    assert str(path) in str(error.value)
+    assert told in str(error.value)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "null", "3"])
+def test_file_that_is_no_model_is_refused(tmp_path, text):
+    path = tmp_path / "model.json"
+    path.write_text(text)
+
+    with pytest.raises(InputError, match=r"model\.json"):
+        load_model(path)
+
+
+def test_absent_file_is_an_input_error(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        load_model(tmp_path / "absent.json")
+
+
+def test_failed_write_leaves_nothing_behind(model, tmp_path):
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "x").touch()
+
+    for target in (tmp_path / "taken", tmp_path / "absent" / "m.json"):
+        with pytest.raises(InputError, match="cannot be written"):
+            save_model(model, target)
+
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["taken", "x"]
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_every_preset_has_a_model_trained_for_it(name):
+    model = load_shipped_model(name)
+
+    assert model.preset == name
+    assert model.training_hash == load_preset(name).training_hash
+    assert model.network.width == (4, 1, 1)
+    assert model.training.settings == TrainingSettings()
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_shipped_model_reaches_the_papers_rmse_on_unseen_profiles(name):
+    errors = load_shipped_model(name).errors["test"]
+
+    assert errors.constant is not None and errors.constant.rmse_K <= 0.0417
+    assert errors.dynamic is not None and errors.dynamic.rmse_K <= 0.0417
+
+
+def test_preset_without_a_model_is_told_how_to_get_one():
+    with pytest.raises(InputError, match="bms train --preset other"):
+        load_shipped_model("other")

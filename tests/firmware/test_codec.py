@@ -1,0 +1,101 @@
+"""Physical values on the bus: the codec in C against cantools for every signal with a unit."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bms.barrier import BusQuantisation
+from bms.firmware._firmware import ffi, lib
+from codegen.can_database import load_database
+from codegen.can_sources import can_sources
+
+DATABASE = load_database()
+SIGNALS = {s.name: s for m in DATABASE.messages for s in m.signals if s.unit}
+NAMES = st.sampled_from(sorted(SIGNALS))
+
+
+def in_c(name: str) -> object:
+    signal = SIGNALS[name]
+    return ffi.new(
+        "codec_signal_t *",
+        {"scale": signal.scale, "offset": signal.offset, "raw_max": 2**signal.length - 3},
+    )
+
+
+@given(name=NAMES, share=st.floats(0, 1))
+def test_nearest_code_is_that_of_cantools(name: str, share: float) -> None:
+    signal = SIGNALS[name]
+    value = signal.minimum + share * (signal.maximum - signal.minimum)
+    raw = lib.codec_encode(in_c(name), value, lib.CODEC_NEAREST)
+    exact = (value - signal.offset) / signal.scale
+    assert abs(raw - exact) <= 0.5 + 0.02
+    assert lib.codec_decode(in_c(name), raw) == pytest.approx(
+        signal.offset + raw * signal.scale, rel=1e-6, abs=1e-5
+    )
+
+
+@given(name=NAMES, raw=st.integers(0, 0xFFFF))
+def test_every_code_survives_decode_and_encode(name: str, raw: int) -> None:
+    raw %= 2 ** SIGNALS[name].length
+    value = lib.codec_decode(in_c(name), raw)
+    if raw > 2 ** SIGNALS[name].length - 3:
+        assert math.isnan(value)
+    else:
+        assert lib.codec_encode(in_c(name), value, lib.CODEC_NEAREST) == raw
+
+
+@given(name=NAMES, value=st.floats(allow_nan=False, width=32))
+def test_values_beyond_the_range_saturate(name: str, value: float) -> None:
+    signal = SIGNALS[name]
+    raw = lib.codec_encode(in_c(name), value, lib.CODEC_NEAREST)
+    if math.isinf(value):
+        assert raw == 2**signal.length - 1
+    elif value < signal.minimum:
+        assert raw == 0
+    elif value > signal.maximum:
+        assert raw == 2**signal.length - 3
+
+
+@pytest.mark.parametrize("name", sorted(SIGNALS))
+def test_what_is_not_a_number_is_sent_as_all_ones(name: str) -> None:
+    raw = lib.codec_encode(in_c(name), math.nan, lib.CODEC_NEAREST)
+    assert raw == 2 ** SIGNALS[name].length - 1
+
+
+@given(value=st.floats(-65, 65, width=32))
+def test_rounding_towards_zero_never_asks_for_more_current(value: float) -> None:
+    raw = lib.codec_encode(in_c("CommandCurrent"), value, lib.CODEC_TOWARDS_ZERO)
+    sent = -65 + raw * 0.002
+    assert abs(sent) <= abs(value) + 0.02 * 0.002 + 1e-5
+    assert abs(sent - value) < 0.002 + 1e-5
+
+
+@pytest.mark.parametrize("value", [0.0, -23.0, -22.998, -0.002, -11.5])
+def test_values_on_a_step_are_sent_as_they_are(value: float) -> None:
+    raw = lib.codec_encode(in_c("CommandCurrent"), value, lib.CODEC_TOWARDS_ZERO)
+    assert -65 + raw * 0.002 == pytest.approx(value, abs=1e-9)
+
+
+def test_margins_assume_the_resolution_of_the_database() -> None:
+    half_steps = BusQuantisation()
+    for field, name in {
+        "current_A": "Current",
+        "surface_temperature_K": "SurfaceTemperature",
+        "coolant_temperature_K": "CoolantTemperature",
+        "cooling_power_W": "CoolingPower",
+    }.items():
+        assert getattr(half_steps, field) == pytest.approx(SIGNALS[name].scale / 2)
+
+
+def test_catalogue_in_c_has_the_database_s_numbers() -> None:
+    text = can_sources()["can_catalog.c"]
+    rows = re.findall(r"\[CAN_SIGNAL_\w+\] = \{ (\S+)f, (\S+)f, (\d+)u \}", text)
+    expected = [(s.scale, s.offset, 2**s.length - 3) for s in SIGNALS.values()]
+    assert len(rows) == len(expected)
+    for (scale, offset, raw_max), row in zip(rows, expected):
+        assert (float(scale), float(offset), int(raw_max)) == pytest.approx(row, rel=1e-7)

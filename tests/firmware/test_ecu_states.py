@@ -1,0 +1,132 @@
+"""The ECU application seen from the bus: when it charges, and how a charge ends."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.firmware.bench import DATABASE, MEASURED, Bench
+
+
+def test_before_all_measurements_came_it_stays_in_init_at_zero() -> None:
+    bench = Bench()
+    for _ in range(20):
+        bench.period(drop=("Coolant",), Request=0)
+        assert (bench.state, bench.command_A) == ("Init", 0.0)
+    bench.period()
+    assert bench.state == "Standby"
+
+
+def test_a_node_that_never_comes_up_is_a_fault_after_start_up() -> None:
+    bench = Bench()
+    for _ in range(60):
+        bench.period(drop=("Coolant",))
+    assert bench.state == "Fault"
+    assert bench.latched() == {2}
+
+
+def test_charging_begins_at_the_edge_of_the_request() -> None:
+    bench = Bench()
+    bench.period(Request=0)
+    assert (bench.state, bench.command_A) == ("Standby", 0.0)
+    bench.period(Request=1)
+    assert (bench.state, bench.command_A) == ("Charging", -23.0)
+
+
+def test_an_ecu_that_starts_in_mid_charge_waits_for_the_edge() -> None:
+    """It does not know how much was charged, so the old state of charge must not be taken."""
+    bench = Bench()
+    for _ in range(30):
+        bench.period(Request=1)
+        assert (bench.state, bench.command_A) == ("Standby", 0.0)
+
+
+def test_charge_is_complete_at_the_completion_state_of_charge_and_stays_off() -> None:
+    bench = Bench()
+    bench.start(PlugInStateOfCharge=0.9895)
+    for _ in range(300):
+        bench.period()
+    assert (bench.state, bench.command_A) == ("Complete", 0.0)
+    assert 0.99 <= bench.answer["StateOfCharge"] < 0.9905
+    bench.period(Request=0)
+    assert bench.state == "Standby"
+
+
+def test_request_off_ends_the_charge_at_once() -> None:
+    bench = Bench()
+    bench.start()
+    bench.period(Request=0)
+    assert (bench.state, bench.command_A) == ("Standby", 0.0)
+
+
+def test_a_hot_cell_is_derated_and_the_reason_is_on_the_bus() -> None:
+    bench = Bench()
+    bench.start()
+    bench.period(SurfaceTemperature=318.0, CoolantTemperature=312.0)
+    assert bench.state == "Derated"
+    assert -23.0 < bench.command_A < 0.0
+    assert bench.answer["ActiveConstraint"] in (3, 4)
+    assert bench.command_A == pytest.approx(bench.answer["LowerCurrent"], abs=0.0021)
+
+
+def test_without_a_safe_current_it_commands_zero_and_says_infeasible() -> None:
+    bench = Bench()
+    bench.start()
+    bench.period(SurfaceTemperature=323.5, CoolantTemperature=322.0)
+    assert (bench.command_A, bench.answer["Feasible"]) == (0.0, 0)
+    assert bench.answer["ActiveConstraint"] == 5
+    assert bench.state == "Derated"
+
+
+@pytest.mark.parametrize(("asked_A", "given_A"), [(-60.0, -23.0), (-5.0, -5.0), (0.0, 0.0)])
+def test_reference_is_followed_but_never_beyond_the_preset(asked_A: float, given_A: float) -> None:
+    bench = Bench()
+    bench.start(ReferenceCurrent=asked_A)
+    assert bench.command_A == pytest.approx(given_A, abs=0.0021)
+
+
+def test_command_is_rounded_towards_zero() -> None:
+    bench = Bench()
+    bench.start()
+    for surface_K in (313.0, 314.0, 315.005, 316.01, 317.015, 318.0):
+        bench.period(SurfaceTemperature=surface_K, CoolantTemperature=305.0)
+        if bench.answer["Feasible"]:
+            assert bench.command_A >= bench.answer["LowerCurrent"] - 0.0011
+
+
+def test_charge_is_counted_from_the_measured_current() -> None:
+    bench = Bench()
+    bench.start(PlugInStateOfCharge=0.3)
+    before = bench.answer["StateOfCharge"]
+    for _ in range(200):
+        bench.period()
+    assert bench.answer["StateOfCharge"] - before == pytest.approx(200 * 0.1 * 23 / 8280, abs=4e-5)
+
+
+def test_every_message_of_the_database_is_received_or_sent() -> None:
+    ecu = Bench().ecu
+    sent = set()
+    for _ in range(10):
+        ecu.step()
+        sent |= {frame_id for frame_id, _ in ecu.transmit()}
+    expected = {m.frame_id for m in DATABASE.messages if m.senders == ["ECU"]}
+    assert sent == expected
+    received = {m.name for m in DATABASE.messages if m.senders == ["PLANT"] and m.length}
+    assert received == set(MEASURED)
+
+
+def test_identity_names_model_and_preset() -> None:
+    bench = Bench()
+    answers = [bench.period() for _ in range(10)]
+    named = [a for a in answers if "ModelHash" in a]
+    assert len(named) == 1
+    assert named[0]["ModelHash"] == int(bench.ecu.model.hash[:8], 16)
+    assert named[0]["PresetHash"] == int(bench.ecu.preset.hash[:4], 16)
+
+
+def test_charge_command_is_the_last_frame_of_every_period() -> None:
+    bench = Bench()
+    for _ in range(12):
+        bench.period()
+        bench.ecu.step()
+        frames = bench.ecu.transmit()
+        assert DATABASE.get_message_by_frame_id(frames[-1][0]).name == "ChargeCommand"

@@ -1,0 +1,43 @@
+"""Firmware ECUs that misbehave in one way."""
+
+from dataclasses import replace
+
+from bms.firmware import Ecu
+from bms.kan import load_shipped_model
+
+IDENTITY_ID = 0x185
+
+
+class SilentAfter:
+    """The firmware, until it says nothing any more after some steps."""
+
+    def __init__(self, preset, steps):
+        self._ecu = Ecu(preset=preset)
+        self._steps_left = steps
+
+    def receive(self, frame_id, data):
+        self._ecu.receive(frame_id, data)
+
+    def step(self):
+        self._ecu.step()
+        self._steps_left -= 1
+
+    def transmit(self):
+        frames = self._ecu.transmit()
+        return frames if self._steps_left >= 0 else []
+
+
+class HotterThanAllowed:
+    """The firmware with temperature limits that are too high by some kelvin, and no identity."""
+
+    def __init__(self, preset, excess_K):
+        limits = replace(
+            preset.limits,
+            max_core_temperature_K=preset.limits.max_core_temperature_K + excess_K,
+            max_surface_temperature_K=preset.limits.max_surface_temperature_K + excess_K,
+        )
+        self._ecu = Ecu(replace(preset, limits=limits), load_shipped_model(preset.name))
+        self.receive, self.step = self._ecu.receive, self._ecu.step
+
+    def transmit(self):
+        return [frame for frame in self._ecu.transmit() if frame[0] != IDENTITY_ID]

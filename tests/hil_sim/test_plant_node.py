@@ -1,0 +1,108 @@
+"""The plant's side of the bus: late and foreign answers, and an ECU that starts later."""
+
+import can
+import pytest
+
+from bms.errors import BusError
+from hil_sim.bus import open_bus
+from hil_sim.e2e import Sender
+from hil_sim.nodes.plant import CONNECT_ATTEMPTS, PlantNode, Request
+from hil_sim.nodes.turns import LockStep
+from hil_sim.recorder import Recorder
+from hil_sim.sensors import Readings
+
+READINGS = Readings(-1.0, 3.3, 300.0, 299.0, 1.0)
+REQUEST = Request(charge=False, reference_current_A=-23.0, plug_in_soc=0.1)
+
+
+class Wire:
+    """A plant node on a bus whose other end a test plays by hand."""
+
+    def __init__(self, name, database, serve, recorder=None):
+        self.near, self.far = open_bus(name), open_bus(name)
+        self.heard = []
+        self._command = Sender(database["ChargeCommand"])
+        self._serve = serve
+        self.node = PlantNode(self.near, database, LockStep(0.1, 0.005, self._respond), recorder)
+
+    def _respond(self):
+        heard = []
+        while (frame := self.far.receive(0.0)) is not None:
+            heard.append(frame)
+        self.heard.append(heard)
+        self._serve(self)
+
+    def command(self, current_A):
+        self.far.send(self._command.frame({"CommandCurrent": current_A, "CommandState": 2}))
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.near.__exit__(None, None, None)
+        self.far.__exit__(None, None, None)
+
+
+def test_measurements_come_before_sync(database):
+    with Wire("virtual:order", database, lambda wire: wire.command(-1.0)) as wire:
+        answer = wire.node.exchange(0, READINGS, REQUEST)
+    assert [frame.frame_id for frame in wire.heard[0]] == [0x100, 0x101, 0x102, 0x103, 0x080]
+    assert answer.command_A == pytest.approx(-1.0)
+    assert answer.state == "charging"
+
+
+def test_an_answer_that_comes_too_late_is_not_taken_for_the_next_one(database):
+    with Wire("virtual:late", database, lambda wire: wire.command(-1.0)) as wire:
+        wire.node.exchange(0, READINGS, REQUEST)
+        wire._serve = lambda wire: None
+        assert wire.node.exchange(1, READINGS, REQUEST).command_A is None
+        wire.command(-7.0)
+        wire._serve = lambda wire: wire.command(-2.0)
+        assert wire.node.exchange(2, READINGS, REQUEST).command_A == pytest.approx(-2.0)
+        assert wire.node.exchange(3, READINGS, REQUEST).command_A == pytest.approx(-2.0)
+
+
+def test_a_repeated_or_corrupt_command_is_none(database):
+    frames = []
+
+    def repeat(wire):
+        if not frames:
+            frames.append(wire._command.frame({"CommandCurrent": -5.0}))
+        wire.far.send(frames[0])
+
+    def corrupt(wire):
+        frame = wire._command.frame({"CommandCurrent": -5.0})
+        wire.far.send(frame._replace(data=frame.data[:3] + bytes([frame.data[3] ^ 1])))
+
+    with Wire("virtual:repeat", database, repeat) as wire:
+        assert wire.node.exchange(0, READINGS, REQUEST).command_A == pytest.approx(-5.0)
+        assert wire.node.exchange(1, READINGS, REQUEST).command_A is None
+        wire._serve = corrupt
+        assert wire.node.exchange(2, READINGS, REQUEST).command_A is None
+
+
+def test_an_ecu_that_starts_later_hears_the_first_period_as_if_it_were_sent_once(
+    database, tmp_path
+):
+    with Recorder(tmp_path / "can.log") as recorder:
+        asleep = iter([True, True, False, False])
+
+        def serve(wire):
+            if not next(asleep):
+                wire.command(0.0)
+
+        with Wire("virtual:start", database, serve, recorder) as wire:
+            wire.node.exchange(0, READINGS, REQUEST)
+            wire.node.exchange(1, READINGS, REQUEST)
+    assert wire.heard[0] == wire.heard[1] == wire.heard[2] != wire.heard[3]
+    with can.LogReader(tmp_path / "can.log") as reader:
+        assert len(list(reader)) == 2 * 6
+
+
+def test_an_ecu_that_never_starts_is_an_error_with_the_remedy(database):
+    with (
+        Wire("virtual:alone", database, lambda wire: None) as wire,
+        pytest.raises(BusError, match="bms ecu --bus virtual:alone"),
+    ):
+        wire.node.exchange(0, READINGS, REQUEST)
+    assert len(wire.heard) == CONNECT_ATTEMPTS
