@@ -1,6 +1,9 @@
 # `make run` and `make test` do all their set-up themselves; see `make help`.
 PYTHON ?= python3
 OUT ?= out/run
+# The matrices here are small: more threads of the linear algebra only wait for each other.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
 
 BIN := .venv/bin
 SOURCES := $(wildcard firmware_c/*/*.[ch]) bms/firmware/build.py setup.py

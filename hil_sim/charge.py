@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from bms.errors import BusError, ModelMismatchError
 from bms.presets import Preset
 from hil_sim.charger import Charger
-from hil_sim.nodes.plant import Answer, PlantNode, Request
+from hil_sim.nodes.plant import NO_FAULT, Answer, PlantNode, Request
 from hil_sim.plant import Plant
 from hil_sim.result import (
     STOP_COMPLETE,
@@ -54,6 +54,7 @@ class Charge:
         self.steps = 0
         self.identity: Identity | None = None
         self.error_bound_K: float | None = None
+        self.first_fault: int | None = None
         self._edge: int | None = None
         self._silent_periods = 0
         self._plug_in_soc = self.plant.state.soc
@@ -114,6 +115,9 @@ class Charge:
         self._silent_periods = 0 if answer.command_A is not None else self._silent_periods + 1
         if self._edge is not None and answer.value("ErrorBound") is not None:
             self.error_bound_K = answer.value("ErrorBound")
+        fault = answer.value("FirstFault")
+        if fault is not None and fault != NO_FAULT:
+            self.first_fault = int(fault)
         model, preset = answer.value("ModelHash"), answer.value("PresetHash")
         if model is not None and preset is not None:
             self.identity = Identity(f"{int(model):08x}", f"{int(preset):04x}")

@@ -14,10 +14,9 @@ from bms.presets import Preset
 from hil_sim.bus import Frame
 from hil_sim.database import MessageCodec, Values
 from hil_sim.e2e import Receiver, Sender
-from hil_sim.nodes.plant import REQUEST_CHARGE
+from hil_sim.nodes.plant import NO_FAULT, REQUEST_CHARGE
 
 STANDBY, CHARGING, DERATED, COMPLETE = 1, 2, 3, 4
-NO_FAULT = 0xFF
 _SENT = ("Estimate", "Decision", "DecisionMargins", "Diagnostics", "ChargeCommand")
 
 

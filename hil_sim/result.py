@@ -73,6 +73,7 @@ class Summary:
     limits_kept: bool
     violations: tuple[str, ...]
     stop_reason: str
+    first_fault: int | None
     infeasible_steps: int
     error_bound_K: float | None
     seed: int
@@ -83,12 +84,21 @@ class Summary:
 
     def to_json(self) -> dict[str, Any]:
         """Plain mapping in the order of the fields."""
-        return asdict(self)
+        return {**asdict(self), "violations": list(self.violations)}
+
+    @property
+    def failures(self) -> list[str]:
+        """What is wrong with the run, one text each."""
+        reasons = list(self.violations)
+        if self.stop_reason not in (STOP_COMPLETE, STOP_TIME_LIMIT):
+            fault = "" if self.first_fault is None else f" {self.first_fault} (monitor.h)"
+            reasons.append(f"run ended by {self.stop_reason}{fault}")
+        return reasons
 
     @property
     def passed(self) -> bool:
         """Whether every limit was kept and the charge did not end in a fault or in silence."""
-        return self.limits_kept and self.stop_reason in (STOP_COMPLETE, STOP_TIME_LIMIT)
+        return not self.failures
 
 
 STOP_COMPLETE, STOP_TIME_LIMIT = "complete", "time-limit"

@@ -190,6 +190,7 @@ def _sum_up(settings: Settings, charge: Charge, reason: str, wall_time_s: float)
         limits_kept=not violations,
         violations=violations,
         stop_reason=reason,
+        first_fault=charge.first_fault,
         infeasible_steps=infeasible_steps(series),
         error_bound_K=charge.error_bound_K if estimates else None,
         seed=settings.seed,

@@ -1,10 +1,14 @@
 """Options of the whole suite."""
 
+from __future__ import annotations
+
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
 
-import bms.firmware
+EXTENSION = "bms.firmware._firmware"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -16,6 +20,20 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    """Put the variant in the place of the installed extension before anybody imports that."""
     folder = config.getoption("--firmware-build")
-    if folder is not None:
-        bms.firmware.__path__.insert(0, str(folder.resolve() / "bms" / "firmware"))
+    if folder is None:
+        return
+    (path,) = (folder / "bms" / "firmware").glob("_firmware*.so")
+    spec = spec_from_file_location(EXTENSION, path.resolve())
+    assert spec is not None and spec.loader is not None
+    assert EXTENSION not in sys.modules, "too late: the installed extension is imported already"
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    sys.modules[EXTENSION] = module
+
+
+def pytest_report_header() -> str:
+    import bms.firmware._firmware as extension  # noqa: PLC0415  (must follow pytest_configure)
+
+    return f"firmware: {extension.__file__}"

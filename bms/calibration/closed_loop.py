@@ -21,7 +21,8 @@ HORIZON_S = 1000.0
 
 
 class Charge(NamedTuple):
-    """Figures of one charge, or arrays of them: peaks, time to full, time of the first derating.
+    """Figures of one charge, or arrays of them: peaks, time to full, time of the first derating,
+    and the smallest charging current on the way (0 A where no current was allowed).
 
     A charge that is not full within the horizon has a time beyond it, by what is missing.
     """
@@ -30,6 +31,7 @@ class Charge(NamedTuple):
     surface_peak_K: Any
     time_s: Any
     first_derate_s: Any
+    smallest_current_A: Any
 
 
 class Start(NamedTuple):
@@ -81,6 +83,7 @@ def _charge(
     core_peak_K = surface_peak_K = temperature_K
     full_s = np.full(soc.shape, np.inf)
     derate_s = np.full(soc.shape, np.inf)
+    smallest_A = np.full(soc.shape, np.inf)
     for step in range(round(HORIZON_S / period_s)):
         current_A = policy(state)
         time_s = step * period_s
@@ -90,6 +93,7 @@ def _charge(
         before = state.soc
         state = integrate_step(cell, state, current_A, start.cooling_power_W, period_s)
         charging = np.isinf(full_s)
+        smallest_A = np.where(charging, np.minimum(smallest_A, -current_A), smallest_A)
         core_peak_K = np.where(
             charging, np.maximum(core_peak_K, state.core_temperature_K), core_peak_K
         )
@@ -108,4 +112,5 @@ def _charge(
         surface_peak_K,
         np.where(np.isinf(full_s), HORIZON_S * (1.0 + missing), full_s),
         np.where(np.isinf(derate_s), HORIZON_S, derate_s),
+        smallest_A,
     )

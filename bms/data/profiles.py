@@ -1,8 +1,11 @@
 """Charging profiles that training and test data are simulated from.
 
 Every profile begins at thermal rest (core, surface and coolant at one temperature), as a charge
-does, with a current step at its first sample. Temperatures, cooling powers and constant currents
-are spread evenly over the operating box by Latin hypercubes.
+does, with a current step at its first sample, and keeps one cooling power. Constant profiles last
+until the cell is full or leaves the operating box, at most an hour; dynamic ones at most 20
+minutes. Samples are 1 s apart. Temperatures, cooling powers and constant currents are spread evenly
+over the box by Latin hypercubes. The start counts in every error figure: the estimate is about one
+fast thermal mode (5 s) ahead there, and no map of the four inputs at one instant can know it.
 """
 
 from __future__ import annotations

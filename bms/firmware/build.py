@@ -58,19 +58,22 @@ def declarations(header: Path) -> str:
     return "\n".join(lines)
 
 
-def make_builder(flags: tuple[str, ...] = FLAGS, base: Path = Path()) -> FFI:
-    """Builder of the extension; source paths begin with base, which setuptools wants relative."""
+def make_builder(flags: tuple[str, ...] = FLAGS, tree: Path | None = None) -> FFI:
+    """Builder of the extension from tree/firmware_c.
+
+    Without a tree it is the repository, with paths relative to it as setuptools wants them.
+    """
     builder = FFI()
-    builder.cdef(
-        "\n".join(declarations(ROOT / FIRMWARE / "include" / f"{name}.h") for name in HEADERS)
-    )
+    home, base = (ROOT, Path()) if tree is None else (tree.resolve(), tree.resolve())
+    headers = [home / FIRMWARE / "include" / f"{name}.h" for name in HEADERS]
+    builder.cdef("\n".join(declarations(header) for header in headers))
     builder.cdef(_HOST_DECLARATIONS)
     folders = [FIRMWARE / name for name in ("include", "src", "generated")]
-    sources = [path for folder in folders for path in sorted((ROOT / folder).glob("*.c"))]
+    sources = [path for folder in folders for path in sorted((home / folder).glob("*.c"))]
     builder.set_source(
         MODULE,
         _HOST_SOURCE,
-        sources=[str(base / path.relative_to(ROOT)) for path in sources],
+        sources=[str(base / path.relative_to(home)) for path in sources],
         include_dirs=[str(base / folder) for folder in folders],
         extra_compile_args=list(flags),
         extra_link_args=[flag for flag in flags if flag.startswith("-fsanitize")],
@@ -82,10 +85,11 @@ def main() -> None:
     """Build a variant of the extension into a folder, beside the installed one."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", type=Path, required=True, help="folder for the extension")
+    parser.add_argument("--tree", type=Path, default=ROOT, help="folder that holds firmware_c")
     parser.add_argument("--sanitize", action="store_true", help="address and undefined behaviour")
     arguments = parser.parse_args()
     flags = (*FLAGS, *SANITIZERS) if arguments.sanitize else FLAGS
-    print(make_builder(flags, ROOT).compile(tmpdir=str(arguments.out)))
+    print(make_builder(flags, arguments.tree).compile(tmpdir=str(arguments.out)))
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from hil_sim.recorder import Recorder
 from hil_sim.sensors import Readings
 
 REQUEST_OFF, REQUEST_CHARGE = 0, 1
+NO_FAULT = 255
 CONNECT_ATTEMPTS = 10
 
 _FROM_ECU = (
@@ -110,14 +111,15 @@ class PlantNode:
                 (self._turn.time_s(period), frame)
                 for frame in self._turn.answers(self._bus, period, self._last_id)
             ]
-            self._connected = self._connected or bool(heard)
+            is_answered = any(frame.frame_id == self._last_id for _, frame in heard)
+            self._connected = self._connected or is_answered
             if self._connected or not self._turn.sync:
                 break
         else:
             raise BusError(
                 f"bus '{self._bus.name}': no ECU answers; start 'bms ecu --bus {self._bus.name}'"
             )
-        self._is_answer_late = self._last_id not in (frame.frame_id for _, frame in heard)
+        self._is_answer_late = not is_answered
         if self._recorder is not None:
             for time_s, frame in late:
                 self._recorder.record(time_s, frame, received=True)

@@ -9,6 +9,10 @@ from hil_sim.bus import CanBus, Frame
 from hil_sim.clock import Clock
 
 
+MOST_FRAMES = 10_000
+"""Foreign frames after which an ECU that does not answer is taken for silent."""
+
+
 class Turn(Protocol):
     """Gathers the frames that answer the measurements of a control period."""
 
@@ -48,7 +52,10 @@ class LockStep:
         """Frames up to the ECU's last one."""
         if self._serve is not None:
             self._serve()
-        while (frame := bus.receive(self._timeout_s)) is not None:
+        for _ in range(MOST_FRAMES):
+            frame = bus.receive(self._timeout_s)
+            if frame is None:
+                return
             yield frame
             if frame.frame_id == last_id:
                 return

@@ -32,7 +32,7 @@ def print_table(
     if first.passed:
         console.print(f"{first.controller}: every limit kept at every sub-step of the plant")
     else:
-        reasons = [*first.violations, f"run ended by {first.stop_reason}"]
-        console.print(f"[red]{first.controller}: check failed: {'; '.join(reasons)}[/red]")
+        reasons = "; ".join(first.failures)
+        console.print(f"[red]{first.controller}: check failed: {reasons}[/red]")
     if out is not None:
         console.print(f"report: {out / 'report.html'}", soft_wrap=True)

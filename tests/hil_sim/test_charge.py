@@ -134,8 +134,8 @@ def test_series_agree_with_the_summary(preset):
     assert series.state[5] in ("charging", "derated")
     derated_at = series.time_s.index(summary.first_derate_s)
     reference_A = preset.limits.reference_current_A
-    assert set(series.current_A[5:derated_at]) == {reference_A}
-    assert series.current_A[derated_at] > reference_A
+    assert max(series.current_A[5:derated_at]) <= reference_A + 0.01
+    assert series.current_A[derated_at] > reference_A + 0.01
     errors = [
         abs(estimate - truth)
         for estimate, truth in itertools.islice(

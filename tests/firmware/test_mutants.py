@@ -1,0 +1,72 @@
+"""Safety claims broken on purpose in the C sources: each must turn its own tests red.
+
+A mutant is built like the sanitized variant, and the named tests run against it in a process of
+their own. A mutant that survives is a claim that nothing checks.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One replacement in one source, and the tests that must notice it."""
+
+    claim: str
+    source: str
+    old: str
+    new: str
+    tests: str
+    only: str = ""
+
+
+DECISION, STATES = "tests/firmware/test_rcbf.py", "tests/firmware/test_ecu_states.py"
+FAULTS, ESTIMATE = "tests/firmware/test_ecu_faults.py", "tests/firmware/test_kan.py"
+MARGINS = "names_the_constraint"
+
+MUTANTS = [
+    Mutant("core disturbance is subtracted", "rcbf.c", "k->core_uncertainty_K_per_s -", "0.0 -", DECISION, MARGINS),
+    Mutant("core margin is subtracted", "rcbf.c", "- k->core_margin_K_per_s", "+ k->core_margin_K_per_s", DECISION, MARGINS),
+    Mutant("surface margin counts", "rcbf.c", "            k->surface_margin_K_per_s2,", "            0.0,", DECISION, MARGINS),
+    Mutant("estimation error is taken at its worst", "rcbf.c", "branch[1].constant += p", "branch[1].constant -= p", DECISION, MARGINS),
+    Mutant("voltage limit decides", "rcbf.c", "constraints[0] = plain(voltage)", "constraints[0] = plain(soc)", DECISION, MARGINS),
+    Mutant("an empty interval gives 0 A", "rcbf.c", "decision.feasible ? decision.lower_A : 0.0f", "decision.lower_A", DECISION, "infeasible"),
+    Mutant("not a number is refused", "rcbf.c", "if (!is_physical(input))", "if (input->reference_current_A > 0.0f)", DECISION, "no_number"),
+    Mutant("extrapolation is flagged", "kan.c", "estimate.in_domain = false;", "estimate.in_domain = true;", ESTIMATE, "flagged"),
+    Mutant("a latched fault ends the charge", "bms.c", "bms->state = BMS_FAULT;\n    }\n    const", "bms->state = bms->state;\n    }\n    const", FAULTS, "stops_the_charge"),
+    Mutant("a symptom stops at once", "bms.c", "!bms->monitor.stop &&", "", FAULTS, "stops_the_charge"),
+    Mutant("silence is noticed", "bms.c", "bms->inbox[i].fresh = false;", "(void)0;", FAULTS, "lost"),
+    Mutant("the CRC is checked", "e2e.c", "if (data[0] != e2e_crc(data, length, data_ids))", "if (length == 0u)", FAULTS, "corrupted_byte"),
+    Mutant("the counter is checked", "e2e.c", "if (started && (jump == 0u))", "if (started && (jump == 99u))", FAULTS, "masquerader"),
+    Mutant("the reference has a ceiling", "bms.c", "(m->reference_current_A < strongest_A) ? strongest_A :", "", STATES, "reference"),
+    Mutant("a charge needs the edge", "bms.c", "bms->may_start && (symptoms", "(symptoms", STATES, "edge"),
+    Mutant("a charge ends when complete", "bms.c", "bms->state = BMS_COMPLETE;", "bms->state = BMS_CHARGING;", STATES, "complete"),
+    Mutant("a fault outlives its symptom", "monitor.c", "monitor->latched |= bit;", "monitor->latched = bit & symptoms;", FAULTS, "whatever_other"),
+    Mutant("commands are rounded towards zero", "codec.c", "(value < 0.0f) ? (1.0f", "(value > 0.0f) ? (1.0f", "tests/firmware/test_codec.py", "towards_zero"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.claim)
+def test_broken_claim_is_noticed(mutant: Mutant, tmp_path: Path) -> None:
+    tree = tmp_path / "tree"
+    shutil.copytree(ROOT / "firmware_c", tree / "firmware_c")
+    source = tree / "firmware_c" / "src" / mutant.source
+    text = source.read_text()
+    assert mutant.old in text, "the mutant no longer applies; bring it up to date"
+    source.write_text(text.replace(mutant.old, mutant.new))
+    python = [sys.executable, "-m"]
+    build = [*python, "bms.firmware.build", "--tree", str(tree), "--out", str(tmp_path / "out")]
+    subprocess.run(build, check=True, cwd=ROOT, capture_output=True)
+    run = [*python, "pytest", "-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", mutant.tests]
+    run += ["--firmware-build", str(tmp_path / "out"), "-k", mutant.only]
+    result = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert result.returncode == 1, f"survived: {mutant.claim}\n{result.stdout[-2000:]}"

@@ -1,0 +1,133 @@
+"""`bms sil`, `bms ecu` and `bms plant` as a user calls them."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+STABLE_KEYS = [
+    "controller",
+    "preset",
+    "bus",
+    "steps",
+    "max_core_temperature_K",
+    "max_surface_temperature_K",
+    "max_voltage_V",
+    "final_soc",
+    "charge_time_s",
+    "first_derate_s",
+    "kan_rmse_K",
+    "kan_max_abs_error_K",
+    "wall_time_s",
+]
+HAS_VCAN = Path("/sys/class/net/vcan0").exists()
+
+
+def bms(*arguments, folder=None):
+    return subprocess.run(
+        [sys.executable, "-c", "from bms.cli import main; main()", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        cwd=folder,
+        check=False,
+    )
+
+
+def test_json_is_all_that_is_printed_and_has_the_stable_keys_first():
+    done = bms("sil", "--json", "--max-time-s", 5, "--seed", 3)
+    assert (done.returncode, done.stderr) == (0, "")
+    summary = json.loads(done.stdout)
+    assert list(summary)[: len(STABLE_KEYS)] == STABLE_KEYS
+    assert (summary["controller"], summary["bus"]) == ("kan-rcbf", "virtual:bms")
+    assert summary["seed"] == 3
+
+
+def test_a_run_writes_its_four_files_and_a_table(tmp_path):
+    done = bms("sil", "--max-time-s", 5, "--out", tmp_path / "run")
+    assert done.returncode == 0
+    assert sorted(file.name for file in (tmp_path / "run").iterdir()) == [
+        "can.log",
+        "charge.png",
+        "report.html",
+        "summary.json",
+    ]
+    assert "Peak core temperature" in done.stdout
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    lines = (tmp_path / "run" / "can.log").read_text().splitlines()
+    assert sum(" 080#" in line for line in lines) == summary["steps"] == 55
+
+
+def test_the_controller_decides_the_exit_code():
+    done = bms("sil", "--controller", "s-cbf", "--max-time-s", 250, "--json")
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["violations"]
+
+
+def test_a_baseline_stands_beside_it_and_does_not():
+    done = bms("sil", "--baseline", "s-cbf", "--max-time-s", 250, "--json")
+    assert done.returncode == 0
+    summary = json.loads(done.stdout)
+    assert summary["limits_kept"] is True
+    assert summary["baseline"]["limits_kept"] is False
+
+
+def test_real_time_takes_its_time():
+    done = bms("sil", "--realtime", "--max-time-s", 1, "--json")
+    assert done.returncode == 0
+    assert 1.5 <= json.loads(done.stdout)["wall_time_s"] < 3.0
+
+
+@pytest.mark.parametrize("command", ["sil", "ecu", "plant"])
+def test_help_explains_and_gives_an_example(command):
+    done = bms(command, "--help")
+    assert done.returncode == 0
+    assert f"Example: bms {command}" in done.stdout
+
+
+no_can = pytest.mark.skipif(HAS_VCAN, reason="this machine has vcan0")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        pytest.param(("sil", "--bus", "socketcan:vcan0"), "virtual:bms", marks=no_can),
+        pytest.param(("plant", "--bus", "socketcan:vcan0"), "vcan_guest.sh", marks=no_can),
+        pytest.param(("ecu", "--bus", "socketcan:vcan0"), "vcan_guest.sh", marks=no_can),
+        (("sil", "--bus", "nonsense:x"), "nonsense"),
+        (("sil", "--bus", "vcan0"), "interface:channel"),
+        (("plant", "--bus", "virtual:bms"), "bms sil"),
+        (("ecu", "--bus", "virtual:bms"), "bms sil"),
+        (("sil", "--out", "/proc/not/writable"), "/proc/not/writable"),
+        (("sil", "--preset", "unheard-of"), "paper_calibrated"),
+        (("ecu", "--bus", "nonsense:x", "--preset", "unheard-of"), "paper_calibrated"),
+        (("sil", "--controller", "unheard-of"), "s-cbf"),
+        (("sil", "--model", "not-there.json"), "not-there.json"),
+        (("sil", "--disturbance", "unheard-of"), "bang-bang"),
+        (("sil", "--seed", "-1"), "--seed"),
+        (("sil", "--max-time-s", "soon"), "--max-time-s"),
+        (("plant",), "--bus"),
+    ],
+)
+def test_wrong_use_is_one_line_on_stderr_and_exit_code_2(arguments, said, tmp_path):
+    done = bms(*arguments, folder=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert len(done.stderr.splitlines()) == 1
+    assert said in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unusable_bus_leaves_no_output_folder(tmp_path):
+    assert bms("sil", "--bus", "nonsense:x", "--out", tmp_path / "run").returncode == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_ecu_starts_without_loading_plots_or_solvers():
+    code = "import sys, hil_sim.commands.ecu; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert not {"matplotlib", "scipy", "cantools", "jinja2"} & set(loaded)

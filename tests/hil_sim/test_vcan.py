@@ -1,0 +1,110 @@
+"""ECU and plant as two processes on a real SocketCAN bus, in the guest where the host has none."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hil_sim.recorder import Recorder
+from hil_sim.session import Settings, run_both
+
+GUEST = Path(__file__).parents[2] / "tools" / "vcan_guest.sh"
+HAS_VCAN = Path("/sys/class/net/vcan0").exists()
+HAS_GUEST = Path("/usr/bin/linux.uml").exists()
+MISSING = "no vcan0 and no user-mode-linux: apt-get install -y user-mode-linux"
+
+pytestmark = pytest.mark.skipif(not (HAS_VCAN or HAS_GUEST or "CI" in os.environ), reason=MISSING)
+
+SEED = 5
+SCRIPT = """
+bms=("$PYTHON" -c 'from bms.cli import main; main()')
+bus=(--bus socketcan:vcan0)
+
+"${bms[@]}" plant "${bus[@]}" --answer-timeout-s 0.1 2> alone.err; echo $? > alone.status
+
+( "${bms[@]}" ecu "${bus[@]}" --silence-s 2 > ecu.out; echo $? > ecu.status ) &
+"${bms[@]}" plant "${bus[@]}" --seed SEED --out run --json > plant.json; echo $? > plant.status
+wait
+
+"${bms[@]}" ecu "${bus[@]}" --realtime > realtime.out &
+ecu=$!
+"${bms[@]}" plant "${bus[@]}" --realtime --max-time-s 3 --json > realtime.json
+kill -TERM $ecu
+wait $ecu; echo $? > realtime.status
+"""
+
+
+def run_in_guest(*command, folder):
+    environment = {**os.environ, "PYTHON": sys.executable, "VCAN_TIMEOUT_S": "240"}
+    return subprocess.run(
+        [GUEST, *command], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def guest(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("vcan")
+    done = run_in_guest("bash", "-c", SCRIPT.replace("SEED", str(SEED)), folder=folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def status(path):
+    return int(path.read_text())
+
+
+def test_two_processes_give_the_frames_of_the_virtual_bus(guest, preset, tmp_path):
+    with Recorder(tmp_path / "can.log") as recorder:
+        expected = run_both(Settings(preset, seed=SEED), recorder).summary
+    assert (guest / "run" / "can.log").read_bytes() == (tmp_path / "can.log").read_bytes()
+    summary = json.loads((guest / "plant.json").read_text())
+    for key, value in expected.to_json().items():
+        if key not in ("bus", "wall_time_s"):
+            assert summary[key] == value
+    assert summary["bus"] == "socketcan:vcan0"
+    assert summary["limits_kept"] is True
+    assert summary["stop_reason"] == "complete"
+
+
+def test_a_full_charge_over_vcan_takes_at_most_a_minute(guest):
+    assert json.loads((guest / "plant.json").read_text())["wall_time_s"] <= 60.0
+
+
+def test_both_processes_end_well_and_the_ecu_saw_every_frame(guest):
+    steps = json.loads((guest / "plant.json").read_text())["steps"]
+    assert status(guest / "plant.status") == status(guest / "ecu.status") == 0
+    assert f"{5 * steps} frames received, {steps} steps" in (guest / "ecu.out").read_text()
+
+
+def test_a_plant_without_an_ecu_says_how_to_start_one(guest):
+    assert status(guest / "alone.status") == 2
+    (line,) = (guest / "alone.err").read_text().splitlines()
+    assert "bms ecu --bus socketcan:vcan0" in line
+
+
+def test_in_real_time_both_run_on_clocks_of_their_own_and_the_ecu_obeys_sigterm(guest):
+    summary = json.loads((guest / "realtime.json").read_text())
+    assert summary["realtime"] is True
+    assert 3.0 <= summary["wall_time_s"] < 6.0
+    assert summary["final_soc"] > 0.085
+    assert summary["limits_kept"] is True
+    assert status(guest / "realtime.status") == 0
+    assert "steps" in (guest / "realtime.out").read_text()
+
+
+@pytest.mark.parametrize("code", [0, 7])
+def test_the_guest_passes_on_output_and_exit_status(tmp_path, code):
+    script = f"echo out; echo 'two  words' >&2; pwd; cat /sys/class/net/vcan0/mtu; exit {code}"
+    done = run_in_guest("bash", "-c", script, folder=tmp_path)
+    assert done.returncode == code
+    assert done.stdout.splitlines() == ["out", str(tmp_path), "72"]
+    assert done.stderr == "two  words\n"
+
+
+def test_the_guest_without_a_command_says_how_to_use_it(tmp_path):
+    done = run_in_guest(folder=tmp_path)
+    assert done.returncode == 64
+    assert done.stderr.startswith("vcan_guest: usage:")
