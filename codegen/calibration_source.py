@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from bms.tables import calibration_fields, network_tables
 from bms.kan.model_file import KanModel
 from bms.presets import Preset
+from bms.tables import calibration_fields, network_tables
 from codegen.rendering import environment, initialiser
 
 FILE_NAME = "calibration_default.c"

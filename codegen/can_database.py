@@ -18,10 +18,13 @@ def database_text() -> str:
 
 def load_database() -> Database:
     """The parsed database."""
-    return cantools.database.load_string(database_text(), database_format="dbc")
+    database = cantools.database.load_string(database_text(), database_format="dbc")
+    assert isinstance(database, Database)
+    return database
 
 
 def data_ids(message: Message) -> bytes:
     """The 16 data ids of AUTOSAR E2E profile 2; empty for an unprotected message."""
-    attribute = message.dbc.attributes.get(E2E_ATTRIBUTE)
-    return bytes.fromhex(attribute.value) if attribute else b""
+    attributes = message.dbc.attributes if message.dbc else {}
+    attribute = attributes.get(E2E_ATTRIBUTE)
+    return bytes.fromhex(str(attribute.value)) if attribute else b""

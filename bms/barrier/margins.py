@@ -85,9 +85,7 @@ def sampling_margins(
     entropic_per_A = Weights(np.sign(cell.entropic_coefficient_V_per_K), 0.0, 0.0)
     coupling = largest_rate(cell, preset, entropic_per_A) * current_A
     core_fall = (
-        largest_rate(
-            cell, preset, Weights(core_gain - constants.a1_per_s, constants.a1_per_s, 0.0)
-        )
+        largest_rate(cell, preset, Weights(core_gain - constants.a1_per_s, constants.a1_per_s, 0.0))
         + np.abs(constants.a2_per_As) * coupling
     )
     surface_fall = (

@@ -37,9 +37,7 @@ def heat_range_W(cell: CellParameters, preset: Preset) -> Interval:
     """Range of the heat generated in the core at currents from the reference to 0 A, in W."""
     current_A = -preset.limits.reference_current_A
     resistance_ohm = cell.ohmic_resistance_ohm
-    slope_V = np.asarray(
-        cell.entropic_coefficient_V_per_K * preset.limits.max_core_temperature_K
-    )
+    slope_V = np.asarray(cell.entropic_coefficient_V_per_K * preset.limits.max_core_temperature_K)
     coolest_A = np.clip(-slope_V / (2.0 * resistance_ohm), 0.0, current_A)
     return Interval(
         low=coolest_A * (resistance_ohm * coolest_A + slope_V),
@@ -111,6 +109,4 @@ def _largest_output(
         fast * change_s
     )
     early = -(slow_part / slow) - (fast_part / fast) - late
-    return sum(
-        np.maximum(part * span.low, part * span.high) for part in (direct, early, late)
-    )
+    return sum(np.maximum(part * span.low, part * span.high) for part in (direct, early, late))

@@ -3,7 +3,8 @@
 Every profile begins at thermal rest (core, surface and coolant at one temperature), as a charge
 does, with a current step at its first sample, and keeps one cooling power. Constant profiles last
 until the cell is full or leaves the operating box, at most an hour; dynamic ones at most 20
-minutes. Samples are 1 s apart. Temperatures, cooling powers and constant currents are spread evenly
+minutes. Profiles of steps, for the error bound only, jump between no current and the strongest one.
+Samples are 1 s apart. Temperatures, cooling powers and constant currents are spread evenly
 over the box by Latin hypercubes. The start counts in every error figure: the estimate is about one
 fast thermal mode (5 s) ahead there, and no map of the four inputs at one instant can know it.
 """
@@ -19,11 +20,12 @@ import numpy.typing as npt
 from bms.presets import Preset
 
 Array = npt.NDArray[np.float64]
-Kind = Literal["constant", "dynamic"]
+Kind = Literal["constant", "dynamic", "steps"]
 KINDS: tuple[Kind, ...] = ("constant", "dynamic")
+"""Kinds that networks are trained and tested on."""
 
 SAMPLE_PERIOD_S = 1.0
-_DURATION_S = {"constant": 3600.0, "dynamic": 1200.0}
+_DURATION_S = {"constant": 3600.0, "dynamic": 1200.0, "steps": 1200.0}
 _COLDEST_START_ABOVE_BOX_K = 2.0
 _WARMEST_START_BELOW_BOX_K = 13.0
 _MAX_INITIAL_SOC = 0.2
@@ -55,6 +57,7 @@ def draw_profiles(preset: Preset, kind: Kind, count: int, rng: np.random.Generat
     Constant: one current from rest, all magnitudes alike. Dynamic: levels held for 30 s to 300 s,
     a fifth of them rests, joined by ramps of 0.05 to 1 A/s and, one in four, by steps; derated as
     a barrier controller does when the core reaches a limit that differs from profile to profile.
+    Steps: 0 A and the reference current in turn, each held for 30 s to 300 s.
     """
     box = preset.operating_box
     shares = _latin_hypercube(count, 5, rng)
@@ -63,6 +66,10 @@ def draw_profiles(preset: Preset, kind: Kind, count: int, rng: np.random.Generat
     steps = round(_DURATION_S[kind] / SAMPLE_PERIOD_S)
     if kind == "constant":
         current_A = np.repeat(_between(shares[:, :1], *box.current_A), steps, axis=1)
+        core_limit_K = np.full(count, np.inf)
+    elif kind == "steps":
+        strongest_A = preset.limits.reference_current_A
+        current_A = np.stack([_jumping_current_A(strongest_A, steps, rng) for _ in shares])
         core_limit_K = np.full(count, np.inf)
     else:
         current_A = np.stack([_wandering_current_A(box.current_A, steps, rng) for _ in shares])
@@ -94,6 +101,14 @@ def _wandering_current_A(
         currents_A += [currents_A[-1], level_A]
     sampled_A: Array = np.interp(np.arange(steps) * SAMPLE_PERIOD_S, times_s, currents_A)
     return sampled_A
+
+
+def _jumping_current_A(strongest_A: float, steps: int, rng: np.random.Generator) -> Array:
+    """The strongest current and none in turn, one value for each sample."""
+    jumps = round(steps * SAMPLE_PERIOD_S / _HOLD_S[0]) + 1
+    held = np.round(rng.uniform(*_HOLD_S, jumps) / SAMPLE_PERIOD_S).astype(int)
+    current_A: Array = np.repeat(strongest_A * (np.arange(jumps) % 2 == 0), held)[:steps]
+    return current_A
 
 
 def _level_A(limits_A: tuple[float, float], rng: np.random.Generator) -> float:

@@ -12,7 +12,8 @@ import numpy as np
 from bms.barrier.margins import BusQuantisation
 from bms.data.datasets import PROFILES_OF_EACH_KIND, Split, simulated_split
 from bms.data.measurements import read_measurements
-from bms.data.simulate import Samples, joined
+from bms.data.profiles import draw_profiles
+from bms.data.simulate import Samples, joined, simulate
 from bms.errors import InputError
 from bms.kan.accuracy import ARITHMETIC_K, error_figures, measurement_error_K
 from bms.kan.basis import Array
@@ -61,6 +62,9 @@ def model_for_preset(
         )
         for split, kinds in data.items()
     }
+    rng = np.random.default_rng([settings.seed, len(splits) + 1])
+    steps = simulate(preset, draw_profiles(preset, "steps", counts["test"], rng), rng)
+    worst_step_K = _figures(network, steps).max_abs_error_K
     test_inputs = samples["test"].inputs
     return _model(
         network,
@@ -71,7 +75,10 @@ def model_for_preset(
             {split: 2 * counts[split] for split in splits},
         ),
         errors,
-        {"sensors": measurement_error_K(network, test_inputs, preset.sensors, BusQuantisation())},
+        {
+            "full_steps_beyond": max(0.0, worst_step_K - errors["test"].overall.max_abs_error_K),
+            "sensors": measurement_error_K(network, test_inputs, preset.sensors, BusQuantisation()),
+        },
         preset,
     )
 

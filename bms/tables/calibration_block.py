@@ -10,10 +10,10 @@ from typing import Any
 
 from bms.barrier import barrier_constants, sampling_margins
 from bms.errors import InputError, ModelMismatchError
-from bms.tables.network_tables import network_tables
 from bms.kan.model_file import KanModel
 from bms.kan.network import INPUT_NAMES
 from bms.presets import Preset
+from bms.tables.network_tables import network_tables
 
 LAYOUT = 1
 """Layout number of bms_calibration_t that this module fills (BMS_CALIBRATION_LAYOUT)."""

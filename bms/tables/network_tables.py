@@ -8,6 +8,7 @@ nodes, so that the firmware needs no exponential. Cells are halved until the err
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -103,11 +104,11 @@ def _edge_table(edge: Edge, degree: int, grid: int, halvings: int) -> EdgeTable:
     extra = grid * halvings - per_cell * (len(own) - 1)
     pieces = [
         np.linspace(low, high, per_cell + (1 if i < extra else 0) + 1)[:-1]
-        for i, (low, high) in enumerate(zip(own[:-1], own[1:]))
+        for i, (low, high) in enumerate(pairwise(own))
     ]
     knots = np.append(np.concatenate(pieces), own[-1]).astype(np.float32).astype(np.float64)
     coefficients, worst, steepest = [], 0.0, 0.0
-    for low, high in zip(knots[:-1], knots[1:]):
+    for low, high in pairwise(knots):
         chebyshev = Chebyshev.interpolate(
             lambda x: edge.evaluate(x, degree)[0], CELL_COEFFICIENTS - 1, [low, high]
         )

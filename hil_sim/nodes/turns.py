@@ -8,7 +8,6 @@ from typing import Protocol
 from hil_sim.bus import CanBus, Frame
 from hil_sim.clock import Clock
 
-
 MOST_FRAMES = 10_000
 """Foreign frames after which an ECU that does not answer is taken for silent."""
 

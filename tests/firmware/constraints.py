@@ -84,10 +84,8 @@ def value(quadratic: Quadratic, u: float) -> float:
     return quadratic[0] + quadratic[1] * u + quadratic[2] * u * u
 
 
-def interval(
-    groups: list[list[Quadratic]], reference_current_A: float
-) -> tuple[float, float]:
-    """Currents that all quadratics and reference <= u <= 0 admit; lower > upper when there are none."""
+def interval(groups: list[list[Quadratic]], reference_current_A: float) -> tuple[float, float]:
+    """Currents that all quadratics and reference <= u <= 0 admit; lower > upper for none."""
     lower, upper = reference_current_A, 0.0
     for constant, linear, quadratic in (q for group in groups for q in group):
         roots = np.roots([quadratic, linear, constant] if quadratic else [linear, constant])

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import cantools.autosar
+from bms.firmware._firmware import ffi, lib
 from hypothesis import given
 from hypothesis import strategies as st
-
-from bms.firmware._firmware import ffi, lib
 
 IDS = st.binary(min_size=16, max_size=16)
 PAYLOAD = st.binary(min_size=2, max_size=8)
@@ -33,7 +32,9 @@ def test_protected_frame_passes_the_check_of_others_and_keeps_its_content(
 
 def protect(counter: int, ids: bytes, length: int = 6) -> bytes:
     return bytes(
-        cantools.autosar.apply_profile2_crc(bytes([0, counter % 16] + [7] * (length - 2)), ids[counter % 16])
+        cantools.autosar.apply_profile2_crc(
+            bytes([0, counter % 16] + [7] * (length - 2)), ids[counter % 16]
+        )
     )
 
 

@@ -8,8 +8,8 @@ from itertools import combinations
 from typing import Any
 
 import pytest
-
 from bms.firmware._firmware import ffi, lib
+
 from tests.firmware.bench import DATABASE, HEALTHY, MEASURED, Bench, frame
 
 NOT_AVAILABLE = {
@@ -44,9 +44,13 @@ CASES = [
     Case("voltage too low", 5, 1, {"Voltage": 0.0}),
     Case("voltage not available", 5, 1, {"Voltage": NOT_AVAILABLE["Voltage"]}),
     Case("surface sensor open", 6, 1, {"SurfaceTemperature": 200.0}),
-    Case("surface not available", 6, 1, {"SurfaceTemperature": NOT_AVAILABLE["SurfaceTemperature"]}),
+    Case(
+        "surface not available", 6, 1, {"SurfaceTemperature": NOT_AVAILABLE["SurfaceTemperature"]}
+    ),
     Case("coolant sensor open", 7, 1, {"CoolantTemperature": 200.0}),
-    Case("coolant not available", 7, 1, {"CoolantTemperature": NOT_AVAILABLE["CoolantTemperature"]}),
+    Case(
+        "coolant not available", 7, 1, {"CoolantTemperature": NOT_AVAILABLE["CoolantTemperature"]}
+    ),
     Case("cooling power negative", 8, 1, {"CoolingPower": -5.0}),
     Case("cooling power not available", 8, 1, {"CoolingPower": NOT_AVAILABLE["CoolingPower"]}),
     Case("request unknown", 9, 1, {"Request": 7}),
@@ -170,7 +174,11 @@ def test_a_calibration_that_the_firmware_refuses_is_a_fault_for_good() -> None:
     bench = Bench()
     state = ffi.new("bms_t *")
     bad = ffi.new("bms_calibration_t *", {"layout": 0})
-    for config in (ffi.NULL, ffi.new("bms_config_t *"), ffi.new("bms_config_t *", {"calibration": bad})):
+    for config in (
+        ffi.NULL,
+        ffi.new("bms_config_t *"),
+        ffi.new("bms_config_t *", {"calibration": bad}),
+    ):
         lib.bms_init(state, config)
         bench.ecu._state = state
         for _ in range(3):

@@ -1,9 +1,10 @@
-"""The estimator in C against the network in exact arithmetic, and its idea of the trained domain."""
+"""The estimator in C against the network in exact arithmetic, and the domain it trusts."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -56,7 +57,7 @@ def random_model(width: tuple[int, ...], grid: int, degree: int, seed: int) -> K
 
     layers = tuple(
         tuple(tuple(edge() for _ in range(before)) for _ in range(after))
-        for before, after in zip(width, width[1:])
+        for before, after in pairwise(width)
     )
     shipped = load_shipped_model("lin2014")
     return replace(shipped, network=replace(shipped.network, degree=degree, layers=layers))
@@ -77,7 +78,9 @@ def test_any_shape_that_fits_gives_the_same_in_c(
     assert np.max(np.abs(in_c - in_python)) <= 1e-4 * span_K
 
 
-@pytest.mark.parametrize(("width", "grid"), [((4, 9, 1), 2), ((4, 8, 8, 1), 2), ((4, 1, 1, 1, 1), 2), ((4, 1, 1), 40)])
+@pytest.mark.parametrize(
+    ("width", "grid"), [((4, 9, 1), 2), ((4, 8, 8, 1), 2), ((4, 1, 1, 1, 1), 2), ((4, 1, 1), 40)]
+)
 def test_what_exceeds_the_maxima_is_refused(width: tuple[int, ...], grid: int) -> None:
     with pytest.raises(InputError, match="exceeds the firmware's"):
         CompiledNetwork(random_model(width, grid, 3, seed=0))

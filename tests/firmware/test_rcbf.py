@@ -55,11 +55,15 @@ def test_decision_equals_osqp_on_the_interval_form(firmware: Firmware) -> None:
     )  # fmt: skip
     feasible = 0
     for state in random_states(1, STATES):
-        lower, upper = interval(quadratics(firmware.parameters, state), state["reference_current_A"])
+        lower, upper = interval(
+            quadratics(firmware.parameters, state), state["reference_current_A"]
+        )
         if lower > upper - 1e-4:
             continue
         feasible += 1
-        solver.update(q=np.array([-state["reference_current_A"]]), l=np.array([lower]), u=np.array([upper]))
+        solver.update(
+            q=np.array([-state["reference_current_A"]]), l=np.array([lower]), u=np.array([upper])
+        )
         expected = float(solver.solve(raise_error=True).x[0])
         decision = solve(firmware, state)
         assert decision.feasible, state
@@ -92,14 +96,18 @@ def test_decision_equals_slsqp_on_the_raw_constraints(firmware: Firmware) -> Non
             options={"ftol": 1e-12, "maxiter": 200},
         )
         checked += 1
-        assert solve(firmware, state).current_A == pytest.approx(answer.x[0], abs=TOLERANCE_A), state
+        assert solve(firmware, state).current_A == pytest.approx(answer.x[0], abs=TOLERANCE_A), (
+            state
+        )
     assert checked > STATES / 4
 
 
 def test_infeasible_states_give_zero_and_say_so(firmware: Firmware) -> None:
     infeasible = 0
     for state in random_states(3, STATES):
-        lower, upper = interval(quadratics(firmware.parameters, state), state["reference_current_A"])
+        lower, upper = interval(
+            quadratics(firmware.parameters, state), state["reference_current_A"]
+        )
         if lower <= upper + 1e-4:
             continue
         infeasible += 1
@@ -159,7 +167,7 @@ def test_a_discharging_reference_is_refused() -> None:
     soc=st.floats(0, 1),
 )
 def test_a_hotter_cell_is_never_charged_harder(temperature: float, rise: float, soc: float) -> None:
-    """Raising all temperatures together leaves the differences and eats the distance to the limits."""
+    """Raising all temperatures leaves the differences and eats the distance to the limits."""
     firmware = Firmware("lin2014")
 
     def current_at(shift: float) -> float:

@@ -66,7 +66,9 @@ def test_core_includes_no_port_and_no_system_header() -> None:
         assert set(re.findall(r"#include <(.+)>", path.read_text())) <= allowed, path.name
 
 
-@pytest.mark.parametrize("path", [*FIRMWARE.glob("src/*"), *FIRMWARE.glob("include/*")], ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    "path", [*FIRMWARE.glob("src/*"), *FIRMWARE.glob("include/*")], ids=lambda p: p.name
+)
 def test_files_stay_small(path: Path) -> None:
     assert len(path.read_text().splitlines()) <= 400
     assert path.stat().st_size <= 15_000

@@ -104,6 +104,21 @@ def test_the_guest_passes_on_output_and_exit_status(tmp_path, code):
     assert done.stderr == "two  words\n"
 
 
+def test_without_the_package_the_guest_names_it(tmp_path):
+    script = tmp_path / "guest.sh"
+    script.write_text(GUEST.read_text().replace("/usr/bin/linux.uml", "/not/there"))
+    done = subprocess.run(
+        ["bash", script, "true"],
+        env={**os.environ, "VCAN_FORCE": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 69
+    assert "apt-get install -y --no-install-recommends user-mode-linux" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
 def test_the_guest_without_a_command_says_how_to_use_it(tmp_path):
     done = run_in_guest(folder=tmp_path)
     assert done.returncode == 64
