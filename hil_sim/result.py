@@ -104,8 +104,8 @@ class Summary:
 STOP_COMPLETE, STOP_TIME_LIMIT = "complete", "time-limit"
 STOP_FAULT, STOP_SILENT = "fault", "ecu-silent"
 
-CHARGING_STATES = ("charging", "derated")
-DERATE_TOLERANCE_A = 0.01
+DERATED_STATE = "derated"
+CHARGING_STATES = ("charging", DERATED_STATE)
 
 
 @dataclass(frozen=True)
@@ -116,14 +116,10 @@ class RunResult:
     series: TimeSeries
 
 
-def first_derate_s(series: TimeSeries, reference_A: float) -> float | None:
-    """First time in s at which less than the reference was commanded while charging."""
-    for time_s, state, command_A in zip(series.time_s, series.state, series.command_A):
-        if state not in CHARGING_STATES or command_A is None:
-            continue
-        if command_A > reference_A + DERATE_TOLERANCE_A:
-            return time_s
-    return None
+def first_derate_s(series: TimeSeries) -> float | None:
+    """First time in s at which a constraint allowed less than was asked for."""
+    derated = (t for t, state in zip(series.time_s, series.state) if state == DERATED_STATE)
+    return next(derated, None)
 
 
 def infeasible_steps(series: TimeSeries) -> int:

@@ -182,7 +182,7 @@ def _sum_up(settings: Settings, charge: Charge, reason: str, wall_time_s: float)
         max_voltage_V=extremes.voltage_V,
         final_soc=charge.plant.state.soc,
         charge_time_s=series.time_s[-1] if reason == "complete" else None,
-        first_derate_s=first_derate_s(series, limits.reference_current_A),
+        first_derate_s=first_derate_s(series),
         kan_rmse_K=rmse_K(errors_K),
         kan_max_abs_error_K=max(map(abs, errors_K), default=None),
         wall_time_s=round(wall_time_s, 3),

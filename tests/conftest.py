@@ -7,6 +7,11 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# The machine may be busy with other tests; time is measured in benchmarks only.
+settings.register_profile("no_deadline", deadline=None)
+settings.load_profile("no_deadline")
 
 EXTENSION = "bms.firmware._firmware"
 

@@ -22,7 +22,7 @@ HORIZON_S = 1000.0
 
 class Charge(NamedTuple):
     """Figures of one charge, or arrays of them: peaks, time to full, time of the first derating,
-    and the smallest charging current on the way (0 A where no current was allowed).
+    and the smallest charging current after it (0 A where no current was allowed).
 
     A charge that is not full within the horizon has a time beyond it, by what is missing.
     """
@@ -57,7 +57,8 @@ def charge_with_robust_barriers(
             cell, preset, constants, margins, state, start.cooling_power_W, error_bound_K
         )
 
-    return _charge(cell, preset, start, policy, period_s)
+    growth_A = preset.limits.current_growth_A_per_s * period_s
+    return _charge(cell, preset, start, policy, period_s, growth_A)
 
 
 def charge_with_surface_barrier(
@@ -69,11 +70,16 @@ def charge_with_surface_barrier(
     def policy(state: CellState) -> Any:
         return s_cbf.charging_current_A(cell, preset, constants, state, start.cooling_power_W)
 
-    return _charge(cell, preset, start, policy, period_s)
+    return _charge(cell, preset, start, policy, period_s, np.inf)
 
 
 def _charge(
-    cell: CellParameters, preset: Preset, start: Start, policy: Policy, period_s: float
+    cell: CellParameters,
+    preset: Preset,
+    start: Start,
+    policy: Policy,
+    period_s: float,
+    growth_A: float,
 ) -> Charge:
     limits = preset.limits
     soc, temperature_K = np.broadcast_arrays(
@@ -84,16 +90,20 @@ def _charge(
     full_s = np.full(soc.shape, np.inf)
     derate_s = np.full(soc.shape, np.inf)
     smallest_A = np.full(soc.shape, np.inf)
+    current_A = np.zeros(soc.shape)
     for step in range(round(HORIZON_S / period_s)):
-        current_A = policy(state)
         time_s = step * period_s
-        derate_s = np.where(
-            np.isinf(derate_s) & (current_A > limits.reference_current_A), time_s, derate_s
-        )
+        wanted_A = np.maximum(limits.reference_current_A, current_A - growth_A)
+        allowed_A = policy(state)
+        derated = allowed_A > wanted_A
+        derate_s = np.where(np.isinf(derate_s) & derated, time_s, derate_s)
+        current_A = np.where(derated, allowed_A, wanted_A)
         before = state.soc
         state = integrate_step(cell, state, current_A, start.cooling_power_W, period_s)
         charging = np.isinf(full_s)
-        smallest_A = np.where(charging, np.minimum(smallest_A, -current_A), smallest_A)
+        smallest_A = np.where(
+            charging & np.isfinite(derate_s), np.minimum(smallest_A, -current_A), smallest_A
+        )
         core_peak_K = np.where(
             charging, np.maximum(core_peak_K, state.core_temperature_K), core_peak_K
         )

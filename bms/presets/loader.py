@@ -17,18 +17,27 @@ def preset_names() -> list[str]:
     return sorted(path.stem for path in _FOLDER.glob("*.toml"))
 
 
+def preset_path(name_or_path: str | Path) -> Path:
+    """File of a preset, by shipped name or by path of a TOML file.
+
+    Raises InputError for a name that does not ship.
+    """
+    path = Path(name_or_path)
+    if path.suffix == ".toml":
+        return path
+    names = preset_names()
+    if str(name_or_path) not in names:
+        raise InputError(
+            f"preset '{name_or_path}': unknown; choose one of {', '.join(names)} "
+            "or give the path of a .toml file"
+        )
+    return _FOLDER / f"{name_or_path}.toml"
+
+
 def load_preset(name_or_path: str | Path) -> Preset:
     """Preset by shipped name or by path of a TOML file.
 
     Raises InputError that names the file, the key and what is wrong with it.
     """
-    path = Path(name_or_path)
-    if path.suffix != ".toml":
-        names = preset_names()
-        if str(name_or_path) not in names:
-            raise InputError(
-                f"preset '{name_or_path}': unknown; choose one of {', '.join(names)} "
-                "or give the path of a .toml file"
-            )
-        path = _FOLDER / f"{name_or_path}.toml"
+    path = preset_path(name_or_path)
     return parse(Preset, read_toml(path), str(path))

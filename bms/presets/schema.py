@@ -17,13 +17,18 @@ from bms.validation import Finite, Negative, NonNegative, Positive, strict
 @strict
 @dataclass(frozen=True)
 class Limits:
-    """Limits of the safe set and the current that is wanted."""
+    """Limits of the safe set, the current that is wanted, and how fast it may grow.
+
+    Shrinking is never limited. The limit on growth gives the estimate time to follow the current,
+    without which the estimate and the surface constraint can drive each other to and fro.
+    """
 
     max_voltage_V: Positive
     max_soc: Positive
     max_core_temperature_K: Positive
     max_surface_temperature_K: Positive
     reference_current_A: Negative
+    current_growth_A_per_s: Positive
     completion_soc: Positive
 
 

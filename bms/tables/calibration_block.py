@@ -68,6 +68,7 @@ def calibration_fields(preset: Preset, model: KanModel) -> dict[str, Any]:
         "preset_hash": int(preset.hash[:8], 16),
         "sampling_period_s": preset.timing.sampling_period_s,
         "reference_current_A": preset.limits.reference_current_A,
+        "current_growth_A": preset.limits.current_growth_A_per_s * preset.timing.sampling_period_s,
         "completion_soc": preset.limits.completion_soc,
         "rcbf": _barrier_fields(preset, model.error_bound_K),
         "plausibility": _plausibility_fields(preset),

@@ -35,6 +35,7 @@ typedef struct {
     uint32_t preset_hash; /* first 32 bits of the preset's SHA-256 */
     float sampling_period_s;
     float reference_current_A; /* strongest current that is ever allowed */
+    float current_growth_A; /* most that a charging current may grow by in one period */
     float completion_soc;
     rcbf_constants_t rcbf;
     plausibility_t plausibility;

@@ -11,8 +11,6 @@
 #define IDENTITY_EVERY_PERIODS 10u
 /* Counter steps of a message that may be skipped before its sequence counts as broken. */
 #define MAX_COUNTER_JUMP 3u
-/* A command this much weaker than the reference is called derated. */
-#define DERATED_A 0.01f
 
 typedef char received_messages_agree[(BMS_RECEIVED_MESSAGES == CAN_RECEIVED_COUNT) ? 1 : -1];
 typedef char transmitted_messages_agree[(BMS_TRANSMITTED_MESSAGES == CAN_TRANSMITTED_COUNT) ? 1
@@ -180,6 +178,17 @@ static void follow_request(bms_t *bms, uint32_t symptoms)
     }
 }
 
+/* What is asked for, within the preset's strongest current and its growth in one period. The weaker
+ * of two charging currents is the greater number. */
+static float wanted_current_A(const bms_t *bms)
+{
+    const float asked_A = bms->measurement.reference_current_A;
+    const float strongest_A = bms->calibration->reference_current_A;
+    const float grown_A = bms->command_A - bms->calibration->current_growth_A;
+    const float allowed_A = (grown_A < strongest_A) ? strongest_A : grown_A;
+    return (asked_A < allowed_A) ? allowed_A : asked_A;
+}
+
 static void decide(bms_t *bms)
 {
     const codec_measurement_t *m = &bms->measurement;
@@ -189,20 +198,16 @@ static void decide(bms_t *bms)
         bms->state = BMS_COMPLETE;
     }
     if (is_charging(bms)) {
-        const float strongest_A = calibration->reference_current_A;
         const rcbf_input_t input = {
             .soc = bms->soc.soc,
             .core_temperature_K = (double)bms->estimate.core_temperature_K,
             .surface_temperature_K = (double)m->surface_temperature_K,
             .coolant_temperature_K = (double)m->coolant_temperature_K,
             .cooling_power_W = m->cooling_power_W,
-            .reference_current_A =
-                (m->reference_current_A < strongest_A) ? strongest_A : m->reference_current_A,
+            .reference_current_A = wanted_current_A(bms),
         };
         bms->decision = rcbf_solve(&calibration->rcbf, &input);
-        bms->state = (bms->decision.current_A > input.reference_current_A + DERATED_A)
-                         ? BMS_DERATED
-                         : BMS_CHARGING;
+        bms->state = (bms->decision.active == RCBF_NONE) ? BMS_CHARGING : BMS_DERATED;
     }
 }
 

@@ -28,6 +28,7 @@ bool calibration_is_valid(const bms_calibration_t *calibration)
     return (calibration->layout == BMS_CALIBRATION_LAYOUT) &&
            is_positive(calibration->sampling_period_s) &&
            is_positive(-calibration->reference_current_A) &&
+           is_positive(calibration->current_growth_A) &&
            is_positive(calibration->completion_soc) &&
            rcbf_constants_are_valid(&calibration->rcbf) &&
            plausibility_is_valid(&calibration->plausibility) &&

@@ -86,6 +86,15 @@ class Bench:
         self.period(Request=1)
         return self.period()
 
+    def start_at_full_current(self, **changes: float) -> dict[str, Any]:
+        """Charging, with the limit on the current's growth behind it."""
+        self.start(**changes)
+        limits = self.ecu.preset.limits
+        growth_A = limits.current_growth_A_per_s * self.ecu.preset.timing.sampling_period_s
+        for _ in range(round(-limits.reference_current_A / growth_A)):
+            self.period()
+        return self.answer
+
     @property
     def state(self) -> str:
         return STATES[int(self.answer["CommandState"])]

@@ -29,7 +29,22 @@ def test_charging_begins_at_the_edge_of_the_request() -> None:
     bench.period(Request=0)
     assert (bench.state, bench.command_A) == ("Standby", 0.0)
     bench.period(Request=1)
-    assert (bench.state, bench.command_A) == ("Charging", -23.0)
+    assert bench.state == "Charging"
+    assert bench.command_A < 0.0
+
+
+def test_current_grows_by_the_preset_s_limit_and_shrinks_at_once() -> None:
+    bench = Bench()
+    bench.start()
+    step_A = bench.ecu.preset.limits.current_growth_A_per_s * 0.1
+    while bench.command_A > -23.0:
+        before_A = bench.command_A
+        bench.period()
+        grown_A = before_A - bench.command_A
+        assert 0.0 < grown_A <= step_A + 0.0021
+        assert bench.state == "Charging"
+    bench.period(ReferenceCurrent=-3.0)
+    assert bench.command_A == pytest.approx(-3.0, abs=0.0021)
 
 
 def test_an_ecu_that_starts_in_mid_charge_waits_for_the_edge() -> None:
@@ -60,7 +75,7 @@ def test_request_off_ends_the_charge_at_once() -> None:
 
 def test_a_hot_cell_is_derated_and_the_reason_is_on_the_bus() -> None:
     bench = Bench()
-    bench.start()
+    bench.start_at_full_current()
     bench.period(SurfaceTemperature=318.0, CoolantTemperature=312.0)
     assert bench.state == "Derated"
     assert -23.0 < bench.command_A < 0.0
@@ -80,13 +95,13 @@ def test_without_a_safe_current_it_commands_zero_and_says_infeasible() -> None:
 @pytest.mark.parametrize(("asked_A", "given_A"), [(-60.0, -23.0), (-5.0, -5.0), (0.0, 0.0)])
 def test_reference_is_followed_but_never_beyond_the_preset(asked_A: float, given_A: float) -> None:
     bench = Bench()
-    bench.start(ReferenceCurrent=asked_A)
+    bench.start_at_full_current(ReferenceCurrent=asked_A)
     assert bench.command_A == pytest.approx(given_A, abs=0.0021)
 
 
 def test_command_is_rounded_towards_zero() -> None:
     bench = Bench()
-    bench.start()
+    bench.start_at_full_current()
     for surface_K in (313.0, 314.0, 315.005, 316.01, 317.015, 318.0):
         bench.period(SurfaceTemperature=surface_K, CoolantTemperature=305.0)
         if bench.answer["Feasible"]:
@@ -95,7 +110,7 @@ def test_command_is_rounded_towards_zero() -> None:
 
 def test_charge_is_counted_from_the_measured_current() -> None:
     bench = Bench()
-    bench.start(PlugInStateOfCharge=0.3)
+    bench.start_at_full_current(PlugInStateOfCharge=0.3)
     before = bench.answer["StateOfCharge"]
     for _ in range(200):
         bench.period()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +20,11 @@ from bms.tables import network_tables
 
 PRESETS = ("lin2014", "paper_calibrated")
 POINTS = 1_000_000
+
+
+@cache
+def lin2014() -> Firmware:
+    return Firmware("lin2014")
 
 
 def box_points(network: Network, count: int, seed: int) -> np.ndarray:
@@ -110,14 +116,14 @@ INSIDE = {
 
 
 def test_estimate_inside_the_box_is_trusted() -> None:
-    assert Firmware("lin2014").estimate(**INSIDE).in_domain
+    assert lin2014().estimate(**INSIDE).in_domain
 
 
 @given(name=st.sampled_from(sorted(INSIDE)), high=st.booleans(), beyond=st.floats(0.01, 1e6))
 def test_estimate_outside_the_box_is_flagged_and_clamped(
     name: str, high: bool, beyond: float
 ) -> None:
-    firmware = Firmware("lin2014")
+    firmware = lin2014()
     low_end, high_end = getattr(firmware.preset.operating_box, name)
     edge = {**INSIDE, name: high_end if high else low_end}
     outside = {**INSIDE, name: high_end + beyond if high else low_end - beyond}
@@ -130,6 +136,6 @@ def test_estimate_outside_the_box_is_flagged_and_clamped(
 
 @given(name=st.sampled_from(sorted(INSIDE)), bad=st.sampled_from([math.nan, math.inf, -math.inf]))
 def test_input_that_is_not_finite_is_flagged(name: str, bad: float) -> None:
-    estimate = Firmware("lin2014").estimate(**{**INSIDE, name: bad})
+    estimate = lin2014().estimate(**{**INSIDE, name: bad})
     assert not estimate.in_domain
     assert math.isfinite(estimate.core_temperature_K)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 import osqp
@@ -20,6 +21,11 @@ PRESETS = ("lin2014", "paper_calibrated")
 STATES = 10_000
 TOLERANCE_A = 1e-3
 INPUTS = ("soc", "core_temperature_K", "surface_temperature_K", "coolant_temperature_K")
+
+
+@cache
+def lin2014() -> Firmware:
+    return Firmware("lin2014")
 
 
 @pytest.fixture(scope="module", params=PRESETS)
@@ -151,13 +157,13 @@ GOOD = {
 
 @given(name=st.sampled_from(sorted(GOOD)), bad=BAD)
 def test_an_input_that_is_no_number_or_unphysical_gives_zero(name: str, bad: float) -> None:
-    decision = Firmware("lin2014").solve(**{**GOOD, name: bad})
+    decision = lin2014().solve(**{**GOOD, name: bad})
     assert (decision.current_A, decision.feasible) == (0.0, False)
     assert decision.active_constraint == "invalid"
 
 
 def test_a_discharging_reference_is_refused() -> None:
-    decision = Firmware("lin2014").solve(**{**GOOD, "reference_current_A": 0.01})
+    decision = lin2014().solve(**{**GOOD, "reference_current_A": 0.01})
     assert (decision.current_A, decision.active_constraint) == (0.0, "invalid")
 
 
@@ -168,7 +174,7 @@ def test_a_discharging_reference_is_refused() -> None:
 )
 def test_a_hotter_cell_is_never_charged_harder(temperature: float, rise: float, soc: float) -> None:
     """Raising all temperatures leaves the differences and eats the distance to the limits."""
-    firmware = Firmware("lin2014")
+    firmware = lin2014()
 
     def current_at(shift: float) -> float:
         return firmware.solve(
