@@ -1,5 +1,5 @@
 """Charging policies to compare with, behind the controller interface of the firmware."""
 
-from bms.baselines import s_cbf
+from bms.baselines.s_cbf import SurfaceBarrierController
 
-__all__ = ["s_cbf"]
+__all__ = ["SurfaceBarrierController"]

@@ -26,7 +26,7 @@ from bms.errors import BmsError
 from bms.presets import DEFAULT_PRESET, Preset, load_preset, preset_path
 from bms.validation import read_text
 
-_ERROR_BOUND_K = 1.07
+_ERROR_BOUND_K = 1.19
 
 
 def run(

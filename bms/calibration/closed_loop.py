@@ -68,7 +68,9 @@ def charge_with_surface_barrier(
     constants = barrier_constants(cell, preset)
 
     def policy(state: CellState) -> Any:
-        return s_cbf.charging_current_A(cell, preset, constants, state, start.cooling_power_W)
+        wanted_A = preset.limits.reference_current_A
+        stages = s_cbf.cascade(cell, preset, constants, state, start.cooling_power_W, wanted_A)
+        return s_cbf.charging_current_A(stages, wanted_A)
 
     return _charge(cell, preset, start, policy, period_s, np.inf)
 

@@ -13,6 +13,7 @@ from bms.data.profiles import SAMPLE_PERIOD_S, Array, Profiles
 from bms.presets import Preset
 
 PROCESS_NOISE_K_PER_S = 5e-4
+_STEPS_PER_SAMPLE = 4
 
 
 @dataclass(frozen=True)
@@ -69,14 +70,15 @@ def simulate(preset: Preset, profiles: Profiles, rng: np.random.Generator) -> Sa
         cores.append(state.core_temperature_K[alive])
         numbers.append(np.flatnonzero(alive))
         noise = PROCESS_NOISE_K_PER_S * rng.standard_normal((3, len(start_K)))
-        state = integrate_step(
-            cell,
-            state,
-            current_A,
-            profiles.cooling_power_W,
-            SAMPLE_PERIOD_S,
-            Disturbance(0.0, *noise),
-        )
+        for _ in range(_STEPS_PER_SAMPLE):
+            state = integrate_step(
+                cell,
+                state,
+                current_A,
+                profiles.cooling_power_W,
+                SAMPLE_PERIOD_S / _STEPS_PER_SAMPLE,
+                Disturbance(0.0, *noise),
+            )
     return Samples(np.concatenate(rows), np.concatenate(cores), np.concatenate(numbers))
 
 

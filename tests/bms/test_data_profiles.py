@@ -17,9 +17,10 @@ def test_wanted_current_lies_in_the_box_and_starts_in_every_part_of_it(kind):
 
     low, high = BOX.current_A
     assert np.all((profiles.wanted_current_A >= low) & (profiles.wanted_current_A <= high))
+    coldest_K, warmest_K = BOX.surface_temperature_K
     for values, (low, high) in (
         (profiles.cooling_power_W, BOX.cooling_power_W),
-        (profiles.initial_temperature_K, (285.0, 313.0)),
+        (profiles.initial_temperature_K, (coldest_K + 2.0, warmest_K - 13.0)),
         (profiles.initial_soc, (0.0, 0.2)),
     ):
         # A Latin hypercube has exactly one value in each of 50 equal parts.

@@ -63,7 +63,12 @@ def test_errors_in_the_model_are_those_of_its_network_on_the_splits(model):
         model.errors["test"].overall.max_abs_error_K
     )
     assert model.error_bound_K == pytest.approx(sum(model.error_bound_parts_K.values()))
-    assert set(model.error_bound_parts_K) == {"held_out_profiles", "sensors", "arithmetic"}
+    assert set(model.error_bound_parts_K) == {
+        "held_out_profiles",
+        "full_steps_beyond",
+        "sensors",
+        "arithmetic",
+    }
 
 
 @pytest.mark.parametrize(
