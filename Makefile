@@ -21,7 +21,7 @@ run: .venv/runtime ## Charge a cell at 10C over a CAN bus and write a report to 
 	$(BIN)/bms sil --baseline s-cbf --out $(OUT)
 
 test: .venv/tests build/sanitized/done lint ## Everything that must pass, real vcan and sanitizers included
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 	tools/sanitized_tests.sh
 
 lint: .venv/tests ## Types, style and C warnings
