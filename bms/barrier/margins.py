@@ -44,7 +44,7 @@ class Margins:
 
 
 def soc_error_bound(cell: CellParameters, preset: Preset, bus: BusQuantisation) -> float:
-    """Bound on the counted state of charge: bias, rounding and disturbance add up, noise as its root."""
+    """Bound on the counted state of charge: steady errors add up, noise grows as the root."""
     sensor = preset.sensors.current_A
     steady_A = abs(sensor.bias) + 0.5 * sensor.resolution + bus.current_A
     noise_As = (
