@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib.metadata import entry_points
 
@@ -37,13 +38,17 @@ def _application(arguments: list[str]) -> typer.Typer:
 
 def main() -> None:
     """Run the command line; what a user can act on becomes one line on stderr and exit code 2."""
+    # The matrices here are small: threads of the linear algebra would only wait for each other.
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")
     try:
         code = _application(sys.argv[1:])(standalone_mode=False)
     except BmsError as error:
         print(f"bms: {error}", file=sys.stderr)
         sys.exit(EXIT_WRONG_USE)
     except TyperException as error:
-        print(f"bms: {error.format_message()}; see 'bms --help'", file=sys.stderr)
+        reason = error.format_message().rstrip(".") or "no command given"
+        print(f"bms: {reason}; see 'bms --help'", file=sys.stderr)
         sys.exit(EXIT_WRONG_USE)
     except (KeyboardInterrupt, Abort):
         print("bms: interrupted", file=sys.stderr)

@@ -43,7 +43,7 @@ def test_line_ends_byte_order_mark_and_blank_lines_do_not_matter(tmp_path, newli
 
 
 @pytest.mark.parametrize("column", range(len(COLUMNS)))
-@pytest.mark.parametrize("text", ["nan", "inf", "-Infinity", "warm", "", "1,5"])
+@pytest.mark.parametrize("text", ["nan", "inf", "-Infinity", "warm", "", "1,5", "1_0"])
 def test_value_that_is_no_finite_number_is_named_with_its_line(tmp_path, column, text):
     cells = ["1.0", *ROW.split(",")[1:]]
     cells[column] = text
@@ -72,6 +72,8 @@ def test_missing_column_is_named(tmp_path, missing):
         ([HEADER, ROW + ",9"], r"a\.csv:2: 7 values"),
         ([HEADER, ROW, "1.0,2.0"], r"a\.csv:3: 2 values"),
         ([HEADER + ",time_s", ROW + ",5"], r"a\.csv:1: column time_s"),
+        ([HEADER, "0" * 200_000 + ROW], r"a\.csv: not valid CSV"),
+        (["x" * 200_000, ROW], r"a\.csv: not valid CSV"),
     ],
 )
 def test_empty_unsorted_and_ragged_files_are_refused(tmp_path, lines, told):

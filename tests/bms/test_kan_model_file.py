@@ -87,7 +87,7 @@ def test_stale_or_malformed_file_is_refused_by_name_and_key(model, tmp_path, cha
     assert told in str(error.value)
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "null", "3"])
+@pytest.mark.parametrize("text", ["", "{", "[]", "null", "3", "[" * 100_000, "1" * 5000])
 def test_file_that_is_no_model_is_refused(tmp_path, text):
     path = tmp_path / "model.json"
     path.write_text(text)

@@ -84,3 +84,4 @@ def test_all_files_or_none(tmp_path: Path) -> None:
     with pytest.raises(InputError):
         write_files(tmp_path, {"a.c": "new", "b.c": "new"})
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.c", "b.c"]
+    assert (tmp_path / "a.c").read_text() == "old"

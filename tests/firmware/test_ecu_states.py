@@ -37,6 +37,7 @@ def test_current_grows_by_the_preset_s_limit_and_shrinks_at_once() -> None:
     bench = Bench()
     bench.start()
     step_A = bench.ecu.preset.limits.current_growth_A_per_s * 0.1
+    assert -2.0 * step_A - 0.0021 <= bench.command_A < -step_A
     while bench.command_A > -23.0:
         before_A = bench.command_A
         bench.period()

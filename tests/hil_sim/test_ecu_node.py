@@ -109,6 +109,19 @@ def test_run_ends_when_it_is_stopped(connected):
     assert node.steps == 0
 
 
+def test_run_ends_when_it_is_stopped_on_a_bus_that_is_busy_without_sync(connected):
+    plant, node = connected
+    looks = iter(range(1000))
+
+    def stopped():
+        plant.send(Frame(0x700, b"never silent"))
+        return next(looks) >= 20
+
+    node.run(silence_s=100.0, stopped=stopped, poll_s=POLL_S)
+    assert node.steps == 0
+    assert node.frames == 20
+
+
 def test_on_its_own_clock_it_steps_each_period_without_sync(connected):
     plant, node = connected
     plant.send(Frame(0x100, b"a"))

@@ -1,7 +1,9 @@
 """The output folder: whole files or none, a page that needs nothing but itself, true figures."""
 
 import base64
+import errno
 import json
+import os
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -24,7 +26,8 @@ def settings(preset):
 
 @pytest.fixture(scope="module")
 def results(settings):
-    return [run_both(replace(settings, controller=kind)) for kind in ControllerKind]
+    kinds = (ControllerKind.KAN_RCBF, ControllerKind.S_CBF)
+    return [run_both(replace(settings, controller=kind)) for kind in kinds]
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +61,30 @@ def test_a_run_that_fails_leaves_older_results_as_they_were(tmp_path):
         raise RuntimeError
     assert [file.name for file in tmp_path.iterdir()] == ["summary.json"]
     assert (tmp_path / "summary.json").read_text() == "old"
+
+
+def test_parents_that_were_made_for_a_failed_run_go_too(tmp_path):
+    (tmp_path / "there").mkdir()
+    with pytest.raises(RuntimeError), OutputFolder(tmp_path / "there" / "new" / "run"):
+        raise RuntimeError
+    assert list(tmp_path.rglob("*")) == [tmp_path / "there"]
+
+
+def test_a_folder_in_the_place_of_a_file_is_refused_before_anything_is_replaced(tmp_path):
+    (tmp_path / "can.log").write_text("old")
+    (tmp_path / "summary.json").mkdir()
+    with pytest.raises(InputError, match=r"summary\.json"), OutputFolder(tmp_path) as folder:
+        for name in ("can.log", "summary.json"):
+            folder.path(name).write_text("new")
+        folder.commit()
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["can.log", "summary.json"]
+    assert (tmp_path / "can.log").read_text() == "old"
+
+
+def test_a_disk_that_fills_up_is_one_line_about_the_folder(tmp_path):
+    with pytest.raises(InputError, match="No space left"), OutputFolder(tmp_path / "run"):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_folder_that_cannot_be_written_is_refused_on_entering(tmp_path):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.recorder import Recorder
 from hil_sim.session import Settings, run_both
 
@@ -89,7 +90,10 @@ def test_in_real_time_both_run_on_clocks_of_their_own_and_the_ecu_obeys_sigterm(
     summary = json.loads((guest / "realtime.json").read_text())
     assert summary["realtime"] is True
     assert 3.0 <= summary["wall_time_s"] < 6.0
-    assert summary["final_soc"] > 0.085
+    preset = load_preset(DEFAULT_PRESET)
+    growth_A_per_s = preset.limits.current_growth_A_per_s
+    charged_As = (summary["final_soc"] - preset.initial.soc) * preset.cell.capacity_As
+    assert charged_As == pytest.approx(0.5 * growth_A_per_s * 3.0**2, rel=0.2)
     assert summary["limits_kept"] is True
     assert status(guest / "realtime.status") == 0
     assert "steps" in (guest / "realtime.out").read_text()

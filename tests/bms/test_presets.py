@@ -1,0 +1,215 @@
+"""Presets load completely or not at all; every complaint names the file and the key."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bms.errors import InputError
+from bms.presets import DEFAULT_PRESET, load_preset, preset_names, preset_path
+from bms.validation import read_toml
+
+CONTENT = read_toml(preset_path(DEFAULT_PRESET))
+MAY_BE_NEGATIVE = {"cell.entropic_coefficient_V_per_K", "limits.reference_current_A"}
+
+
+def leaves(content, path=()):
+    """Paths of all values that are no tables."""
+    for key, value in content.items():
+        if isinstance(value, dict):
+            yield from leaves(value, (*path, key))
+        else:
+            yield (*path, key)
+
+
+def at(content, path):
+    for key in path:
+        content = content[key]
+    return content
+
+
+def as_toml(content):
+    """TOML text of a preset's content; a key without table comes before the tables."""
+
+    def text(value):
+        if isinstance(value, dict):
+            return "{" + ", ".join(f"{key} = {text(item)}" for key, item in value.items()) + "}"
+        if isinstance(value, list):
+            return "[" + ", ".join(map(text, value)) + "]"
+        return str(value) if isinstance(value, float) else json.dumps(value)
+
+    ordered = sorted(content.items(), key=lambda item: isinstance(item[1], dict))
+    return "\n".join(f"{key} = {text(value)}" for key, value in ordered)
+
+
+ALL = sorted(leaves(CONTENT))
+NUMBERS = [path for path in ALL if isinstance(at(CONTENT, path), int | float)]
+LISTS = [path for path in ALL if isinstance(at(CONTENT, path), list)]
+
+
+def names(paths):
+    return [".".join(path) for path in paths]
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Preset from content with one value replaced, or removed when the new value is `...`."""
+
+    def load_changed(path=(), value=None):
+        content = copy.deepcopy(CONTENT)
+        if path:
+            table = at(content, path[:-1])
+            if value is ...:
+                del table[path[-1]]
+            else:
+                table[path[-1]] = value
+        file = tmp_path / "changed.toml"
+        file.write_text(as_toml(content), encoding="utf-8")
+        return load_preset(file)
+
+    return load_changed
+
+
+def refused(load, path, value):
+    with pytest.raises(InputError) as caught:
+        load(path, value)
+    message = str(caught.value)
+    assert "changed.toml" in message and "\n" not in message
+    return message
+
+
+def test_the_shipped_presets_are_these_two_and_carry_their_names():
+    assert preset_names() == ["lin2014", "paper_calibrated"]
+    for name in preset_names():
+        preset = load_preset(name)
+        assert preset.name == name
+        assert preset.sources
+
+
+def test_a_copy_by_path_is_the_same_preset(load):
+    assert load() == load_preset(DEFAULT_PRESET)
+
+
+@pytest.mark.parametrize("path", ALL, ids=names(ALL))
+def test_a_missing_key_is_named(load, path):
+    assert ".".join(path) in refused(load, path, ...)
+
+
+@pytest.mark.parametrize("path", ALL, ids=names(ALL))
+def test_text_or_a_number_in_the_wrong_place_is_named(load, path):
+    wrong = 1.0 if isinstance(at(CONTENT, path), str) else "3.0"
+    assert ".".join(path) in refused(load, path, wrong)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf], ids=str)
+@pytest.mark.parametrize("path", NUMBERS, ids=names(NUMBERS))
+def test_a_number_that_is_not_finite_is_named(load, path, value):
+    assert ".".join(path) in refused(load, path, value)
+
+
+@pytest.mark.parametrize("path", LISTS, ids=names(LISTS))
+def test_a_list_with_nan_or_text_names_its_element(load, path):
+    numeric = not isinstance(at(CONTENT, path)[0], str)
+    for wrong in (math.nan, "x") if numeric else (1.0,):
+        values = [wrong, *at(CONTENT, path)[1:]]
+        assert ".".join(path) + ".0" in refused(load, path, values)
+
+
+@pytest.mark.parametrize("path", NUMBERS, ids=names(NUMBERS))
+def test_a_sign_that_has_no_meaning_is_named(load, path):
+    key = ".".join(path)
+    if key == "limits.reference_current_A":
+        assert key in refused(load, path, 23.0)
+    elif key in MAY_BE_NEGATIVE or path[-1] == "bias":
+        load(path, -abs(at(CONTENT, path)))
+    else:
+        assert key in refused(load, path, -1.0)
+
+
+@pytest.mark.parametrize("section", ["", "cell", "limits", "sensors.voltage_V"])
+def test_an_unknown_key_is_named(load, section):
+    path = (*filter(None, section.split(".")), "typing_error")
+    assert ".".join(path) in refused(load, path, 1.0)
+
+
+@pytest.mark.parametrize("key", sorted(CONTENT["operating_box"]))
+def test_a_range_that_does_not_rise_is_named(load, key):
+    low, high = CONTENT["operating_box"][key]
+    for wrong in ([high, low], [low, low]):
+        assert key in refused(load, ("operating_box", key), wrong)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "named"),
+    [
+        (("operating_box", "current_A"), [-22.0, 0.5], "operating_box.current_A"),
+        (("operating_box", "current_A"), [-24.0, -0.5], "operating_box.current_A"),
+        (("limits", "completion_soc"), 1.01, "limits.completion_soc"),
+        (("initial", "soc"), 1.01, "initial.soc"),
+        (("gains", "alpha3_per_s2"), 0.0901, "gains"),
+        (("gains", "alpha4_per_s"), 0.44, "gains"),
+    ],
+)
+def test_values_that_do_not_go_together_are_refused(load, path, value, named):
+    assert named in refused(load, path, value)
+
+
+def test_gains_with_a_double_real_root_are_the_last_that_are_accepted(load):
+    assert load(("gains", "alpha3_per_s2"), 0.09).gains.alpha3_per_s2 == 0.09
+
+
+def test_the_core_gain_defaults_to_the_core_time_constant(load):
+    preset = load()
+    cell = preset.cell
+    assert preset.gains.core_gain_per_s(cell) == pytest.approx(
+        1 / (cell.core_resistance_K_per_W * cell.core_heat_capacity_J_per_K)
+    )
+    assert load(("gains", "alpha2_per_s"), 0.03).gains.core_gain_per_s(cell) == 0.03
+
+
+def test_an_unknown_name_lists_the_names_there_are():
+    with pytest.raises(InputError, match=r"lin2015.*lin2014, paper_calibrated"):
+        load_preset("lin2015")
+
+
+def test_an_absent_file_and_a_syntax_error_name_the_file(tmp_path):
+    with pytest.raises(InputError, match=r"nowhere\.toml: no such file"):
+        load_preset(tmp_path / "nowhere.toml")
+    broken = tmp_path / "broken.toml"
+    broken.write_text('name = "x"\n[cell\n', encoding="utf-8")
+    with pytest.raises(InputError, match=r"broken\.toml: not valid TOML.*line 2"):
+        load_preset(broken)
+
+
+@pytest.mark.parametrize("path", NUMBERS, ids=names(NUMBERS))
+def test_the_hash_changes_with_every_number(load, path):
+    value = at(CONTENT, path)
+    changed = load(path, value * 0.999 if value else 1e-6)
+    assert changed.hash != load().hash
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "same"),
+    [
+        (("cell", "ohmic_resistance_ohm"), 0.02, False),
+        (("operating_box", "cooling_power_W"), [0.0, 9.0], False),
+        (("uncertainty", "core_K_per_s"), 1e-3, False),
+        (("limits", "max_core_temperature_K"), 320.0, True),
+        (("description",), "other words", True),
+    ],
+)
+def test_only_what_training_depends_on_makes_a_model_stale(load, path, value, same):
+    changed = load(path, value)
+    assert changed.hash != load().hash
+    assert (changed.training_hash == load().training_hash) is same
+
+
+@given(bias=st.floats(-1.0, 1.0), noise=st.floats(0.0, 1.0), resolution=st.floats(0.0, 1.0))
+def test_a_readings_error_bound_adds_bias_noise_and_rounding(bias, noise, resolution):
+    sensor = type(load_preset("lin2014").sensors.current_A)(resolution, noise, bias)
+    assert sensor.error_bound == pytest.approx(abs(bias) + 4.0 * noise + 0.5 * resolution)
