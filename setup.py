@@ -2,4 +2,4 @@
 
 from setuptools import setup
 
-setup(cffi_modules=["bms/firmware/build.py:ffibuilder"])
+setup(cffi_modules=["bms/firmware/build.py:ffibuilder", "hil_sim/campaign/build.py:ffibuilder"])

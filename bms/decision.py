@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -35,7 +36,11 @@ class Decision:
 
 
 class Observation(NamedTuple):
-    """What a controller is told each period; a controller uses the part that its method assumes."""
+    """What a controller is told each period; a controller uses the part that its method assumes.
+
+    NaN stands for what it is not told: a controller that only measures has no core temperature,
+    one that is given the true state needs neither voltage nor current of the last period.
+    """
 
     soc: float
     core_temperature_K: float
@@ -43,6 +48,15 @@ class Observation(NamedTuple):
     coolant_temperature_K: float
     cooling_power_W: float
     reference_current_A: float
+    voltage_V: float = math.nan
+    current_A: float = math.nan
+
+
+NO_MARGINS = ConstraintMargins(math.nan, math.nan, math.nan, math.nan)
+"""Of a decision without barrier constraints."""
+
+INVALID = Decision(0.0, False, "invalid", math.inf, -math.inf, NO_MARGINS)
+"""The answer to an observation that cannot be used."""
 
 
 class Controller(Protocol):

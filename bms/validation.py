@@ -34,7 +34,8 @@ def strict(cls: type[T]) -> type[T]:
 def parse(kind: type[T], content: Any, where: str) -> T:
     """Object of a dataclass from decoded TOML or JSON; InputError names the first wrong key."""
     try:
-        return TypeAdapter(kind).validate_json(json.dumps(content, allow_nan=True))
+        # A TOML date is no JSON value; as text it is refused where a number is wanted.
+        return TypeAdapter(kind).validate_json(json.dumps(content, allow_nan=True, default=str))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         key = ".".join(str(part) for part in first["loc"]) or "content"
@@ -56,8 +57,8 @@ def read_toml(path: Path) -> dict[str, Any]:
     """Decoded TOML; InputError names file and line of a syntax error."""
     try:
         return tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not valid TOML: {error}") from None
+    except (ValueError, RecursionError) as error:  # numbers too long, nesting too deep as well
+        raise InputError(f"{path}: not valid TOML: {error}; mend the file") from None
 
 
 def read_json(path: Path) -> Any:
@@ -66,3 +67,5 @@ def read_json(path: Path) -> Any:
         return json.loads(read_text(path))
     except json.JSONDecodeError as error:
         raise InputError(f"{path}:{error.lineno}: not valid JSON: {error.msg}") from None
+    except (ValueError, RecursionError) as error:  # a number too long, nesting too deep
+        raise InputError(f"{path}: not valid JSON: {error}; mend the file") from None

@@ -31,7 +31,8 @@ def environment() -> jinja2.Environment:
 
 def float_literal(value: float) -> str:
     """C99 literal that reads back as exactly the nearest float32; InputError beyond its range."""
-    single = np.float32(value)
+    with np.errstate(over="ignore"):
+        single = np.float32(value)
     if not np.isfinite(single):
         raise InputError(f"number {value}: does not fit into float32")
     digits = f"{float(single):.9g}"
@@ -59,8 +60,11 @@ def initialiser(value: Any, depth: int = 0) -> str:
 def write_files(folder: Path, contents: Mapping[str, str]) -> list[Path]:
     """Write all files or none: they are completed under other names first and then renamed.
 
-    Raises InputError when the folder cannot be written.
+    Raises InputError when the folder cannot be written, or a folder stands where a file has to go.
     """
+    for target in (folder / name for name in contents):
+        if target.is_dir():
+            raise InputError(f"{target}: is a folder; choose another one for the files")
     staged: list[tuple[Path, Path]] = []
     try:
         folder.mkdir(parents=True, exist_ok=True)

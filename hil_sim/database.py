@@ -10,14 +10,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.resources import files
 from typing import Any
 
-import cantools
+from codegen import can_database
 
 COUNTER_MODULUS = 16
 _POLYNOMIAL = 0x2F
-_DATA_ID_ATTRIBUTE = "E2EProfile2DataIdList"
 
 Values = dict[str, "float | None"]
 
@@ -55,8 +53,7 @@ class MessageCodec:
         self._message = message
         self._counter = f"{message.name}Counter"
         self._crc = f"{message.name}Crc"
-        attribute = message.dbc.attributes.get(_DATA_ID_ATTRIBUTE)
-        self.data_ids = bytes.fromhex(attribute.value) if attribute else b""
+        self.data_ids = can_database.data_ids(message)
         self._signals = [_signal(s) for s in message.signals]
         self._payload = [s for s in self._signals if s.name not in (self._counter, self._crc)]
 
@@ -115,9 +112,7 @@ def profile2_crc(payload: bytes | bytearray, data_id: int) -> int:
 
 def load_database() -> dict[str, MessageCodec]:
     """Every message of the project's CAN database by name."""
-    text = files("codegen").joinpath("can/bms.dbc").read_text(encoding="utf-8")
-    database: Any = cantools.database.load_string(text, "dbc")
-    return {message.name: MessageCodec(message) for message in database.messages}
+    return {m.name: MessageCodec(m) for m in can_database.load_database().messages}
 
 
 def _crc_of_byte(byte: int) -> int:

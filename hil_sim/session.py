@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bms.baselines.s_cbf import SurfaceBarrierController
+from bms.baselines import BASELINES
 from bms.firmware import Ecu
 from bms.presets import Preset
 from hil_sim.bus import CanBus, open_bus, require_shared
@@ -23,10 +23,11 @@ from hil_sim.disturbances import DisturbanceKind, disturbance_source
 from hil_sim.nodes.ecu import EcuLike, EcuNode
 from hil_sim.nodes.plant import PlantNode
 from hil_sim.nodes.turns import LockStep, OnClock, PacedLockStep, Turn
-from hil_sim.oracle import OracleEcu
 from hil_sim.plant import SUB_STEPS, Plant
+from hil_sim.python_ecu import PythonEcu
 from hil_sim.recorder import Recorder
 from hil_sim.result import (
+    STOP_COMPLETE,
     RunResult,
     Summary,
     estimate_errors_K,
@@ -35,15 +36,19 @@ from hil_sim.result import (
     rmse_K,
 )
 from hil_sim.sensors import SensorSuite
+from hil_sim.views import BusMeasurements, TrueState
 
 ANSWER_TIMEOUT_S = 1.0
 
 
 class ControllerKind(str, Enum):
-    """Names on the command line."""
+    """Names on the command line: the firmware, and each of bms.baselines.BASELINES."""
 
     KAN_RCBF = "kan-rcbf"
     S_CBF = "s-cbf"
+    S_CBF_SINGLE_STEP = "s-cbf-single-step"
+    CC_CV = "cc-cv"
+    MULTI_STAGE = "multi-stage"
 
 
 EcuFactory = Callable[[Plant, "dict[str, MessageCodec]"], EcuLike]
@@ -132,12 +137,12 @@ def _factory(settings: Settings) -> EcuFactory:
     preset = settings.preset
     if settings.controller is ControllerKind.KAN_RCBF:
         return lambda plant, database: Ecu(preset=preset, model=settings.model)
-    return lambda plant, database: OracleEcu(
-        SurfaceBarrierController(preset),
+    baseline = BASELINES[settings.controller.value]
+    return lambda plant, database: PythonEcu(
+        lambda: baseline.make(preset),
         preset,
         database,
-        lambda: plant.state,
-        plant.cooling_power_W,
+        TrueState(plant) if baseline.knows_true_state else BusMeasurements(preset, database),
     )
 
 
@@ -181,7 +186,7 @@ def _sum_up(settings: Settings, charge: Charge, reason: str, wall_time_s: float)
         max_surface_temperature_K=extremes.surface_temperature_K,
         max_voltage_V=extremes.voltage_V,
         final_soc=charge.plant.state.soc,
-        charge_time_s=series.time_s[-1] if reason == "complete" else None,
+        charge_time_s=series.time_s[-1] if reason == STOP_COMPLETE else None,
         first_derate_s=first_derate_s(series),
         kan_rmse_K=rmse_K(errors_K),
         kan_max_abs_error_K=max(map(abs, errors_K), default=None),

@@ -85,14 +85,14 @@ def charging_current_A(
     for sign in (-1.0, 1.0):
         error_K = sign * error_bound_K
         intervals.append(
-            _roots(
+            quadratic_interval(
                 a.a3_K_per_A2s,
                 a.a2_per_As * (core_K + error_K),
                 rest.core_K_per_s - margins.core_K_per_s + core_error_per_s * error_K,
             )
         )
         intervals.append(
-            _roots(
+            quadratic_interval(
                 -a.a9_K_per_A2s2,
                 a.a8_per_As2 * (core_K + error_K),
                 rest.surface_K_per_s2 - margins.surface_K_per_s2 + a.a4_per_s2 * error_K,
@@ -106,8 +106,11 @@ def charging_current_A(
     return np.where(lower_A <= upper_A, lower_A, 0.0)
 
 
-def _roots(square: Any, slope: Any, rest: Any) -> tuple[Any, Any]:
-    """Interval in which rest + slope u - square u^2 >= 0 (square > 0); (inf, -inf) where empty."""
+def quadratic_interval(square: Any, slope: Any, rest: Any) -> tuple[Any, Any]:
+    """Interval in which rest + slope u - square u^2 >= 0 (square > 0); (inf, -inf) where empty.
+
+    Floats or arrays of one shape.
+    """
     discriminant = slope * slope + 4.0 * square * rest
     # The larger sum first and the other root by Vieta, so that nothing cancels.
     with np.errstate(divide="ignore", invalid="ignore"):

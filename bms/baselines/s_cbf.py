@@ -17,7 +17,7 @@ import numpy as np
 
 from bms.barrier import BarrierConstants, barrier_constants
 from bms.cell import CellParameters, CellState
-from bms.decision import ConstraintMargins, Decision, Observation
+from bms.decision import INVALID, ConstraintMargins, Decision, Observation
 from bms.presets import Preset
 
 
@@ -78,7 +78,8 @@ def cascade(
 def charging_current_A(stages: Cascade, reference_current_A: Any) -> Any:
     """Current of the cascade in A; 0 A where nothing is allowed."""
     lower_A = np.maximum(
-        np.maximum(stages.voltage_A, stages.soc_A), np.maximum(stages.surface_A, reference_current_A)
+        np.maximum(stages.voltage_A, stages.soc_A),
+        np.maximum(stages.surface_A, reference_current_A),
     )
     return np.where((stages.heat_W >= 0.0) & (lower_A <= 0.0), lower_A, 0.0)
 
@@ -98,15 +99,10 @@ class SurfaceBarrierController:
 
         The method has no core constraint: that margin is always infinite.
         """
-        if not all(math.isfinite(value) for value in observation):
-            nothing = ConstraintMargins(math.nan, math.nan, math.nan, math.nan)
-            return Decision(0.0, False, "invalid", math.inf, -math.inf, nothing)
-        state = CellState(
-            observation.soc,
-            observation.core_temperature_K,
-            observation.surface_temperature_K,
-            observation.coolant_temperature_K,
-        )
+        state = CellState(*observation[:4])
+        told = (*state, observation.cooling_power_W, observation.reference_current_A)
+        if not all(map(math.isfinite, told)):
+            return INVALID
         strongest_A = self._preset.limits.reference_current_A
         wanted_A = min(max(observation.reference_current_A, strongest_A), 0.0)
         stages = cascade(

@@ -26,8 +26,6 @@ from bms.errors import BmsError
 from bms.presets import DEFAULT_PRESET, Preset, load_preset, preset_path
 from bms.validation import read_text
 
-_ERROR_BOUND_K = 1.19
-
 
 def run(
     preset: Annotated[
@@ -41,8 +39,9 @@ def run(
         int, typer.Option("--generations", min=0, help="Length of the search; 0 only compares.")
     ] = 150,
     error_bound_K: Annotated[
-        float, typer.Option("--error-bound", min=0.0, help="Error bound of the estimator in K.")
-    ] = _ERROR_BOUND_K,
+        float | None,
+        typer.Option("--error-bound", min=0.0, help="Error bound of the estimator in K."),
+    ] = None,
 ) -> None:
     """Fit a preset's free parameters to the paper's seven figures and print what is left.
 
@@ -60,7 +59,7 @@ def run(
 
 
 def _search(
-    preset: Preset, error_bound_K: float, seed: int, generations: int, console: Console
+    preset: Preset, error_bound_K: float | None, seed: int, generations: int, console: Console
 ) -> Preset:
     columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as progress:
@@ -96,7 +95,7 @@ def _parameter_table(preset: Preset) -> Table:
     return table
 
 
-def _figure_table(preset: Preset, error_bound_K: float) -> Table:
+def _figure_table(preset: Preset, error_bound_K: float | None) -> Table:
     initial = preset.initial
     start = Start(initial.soc, initial.temperature_K, initial.cooling_power_W)
     charges = both_charges(preset, preset.cell, start, error_bound_K, FINAL_PERIOD_S)

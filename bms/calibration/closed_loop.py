@@ -22,7 +22,7 @@ HORIZON_S = 1000.0
 
 class Charge(NamedTuple):
     """Figures of one charge, or arrays of them: peaks, time to full, time of the first derating,
-    and the smallest charging current after it (0 A where no current was allowed).
+    and by how much a derated charging current grew again.
 
     A charge that is not full within the horizon has a time beyond it, by what is missing.
     """
@@ -31,7 +31,7 @@ class Charge(NamedTuple):
     surface_peak_K: Any
     time_s: Any
     first_derate_s: Any
-    smallest_current_A: Any
+    regrowth_A: Any
 
 
 class Start(NamedTuple):
@@ -92,6 +92,7 @@ def _charge(
     full_s = np.full(soc.shape, np.inf)
     derate_s = np.full(soc.shape, np.inf)
     smallest_A = np.full(soc.shape, np.inf)
+    regrowth_A = np.zeros(soc.shape)
     current_A = np.zeros(soc.shape)
     for step in range(round(HORIZON_S / period_s)):
         time_s = step * period_s
@@ -103,9 +104,9 @@ def _charge(
         before = state.soc
         state = integrate_step(cell, state, current_A, start.cooling_power_W, period_s)
         charging = np.isinf(full_s)
-        smallest_A = np.where(
-            charging & np.isfinite(derate_s), np.minimum(smallest_A, -current_A), smallest_A
-        )
+        counted = charging & np.isfinite(derate_s)
+        smallest_A = np.where(counted, np.minimum(smallest_A, -current_A), smallest_A)
+        regrowth_A = np.where(counted, np.maximum(regrowth_A, -current_A - smallest_A), regrowth_A)
         core_peak_K = np.where(
             charging, np.maximum(core_peak_K, state.core_temperature_K), core_peak_K
         )
@@ -124,5 +125,5 @@ def _charge(
         surface_peak_K,
         np.where(np.isinf(full_s), HORIZON_S * (1.0 + missing), full_s),
         np.where(np.isinf(derate_s), HORIZON_S, derate_s),
-        smallest_A,
+        regrowth_A,
     )

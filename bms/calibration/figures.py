@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bms.calibration.closed_loop import Charge
-
 
 @dataclass(frozen=True)
 class Figure:

@@ -22,8 +22,8 @@ class OpenCircuitVoltage:
     charge rises from 0 to 1 and the voltage rises with it.
     """
 
-    soc: tuple[float, ...]
-    voltage_V: tuple[float, ...]
+    soc: tuple[Finite, ...]
+    voltage_V: tuple[Finite, ...]
 
     def __post_init__(self) -> None:
         if len(self.soc) != len(self.voltage_V) or len(self.soc) < 2:

@@ -11,8 +11,10 @@ from typing import Annotated
 import numpy as np
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
+from bms.commands.options import DataOption
 from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
 from bms.data.simulate import Samples, joined
@@ -33,12 +35,7 @@ class Engine(str, Enum):
 
 def evaluate(
     model: Annotated[Path, typer.Option("--model", help="Model to evaluate (JSON).")],
-    data: Annotated[
-        Path | None,
-        typer.Option(
-            "--data", help="CSV: time_s, current_A, ..., core_temperature_K (s, A, W, K)."
-        ),
-    ] = None,
+    data: DataOption = None,
     preset: Annotated[
         str | None, typer.Option("--preset", help="Simulate new profiles from it.")
     ] = None,
@@ -71,7 +68,7 @@ def evaluate(
     if as_json:
         typer.echo(json.dumps(result, indent=1))
     else:
-        table = Table("figure", "value", title=f"{model}, engine {engine.value}")
+        table = Table("figure", "value", title=escape(f"{model}, engine {engine.value}"))
         for name, value in result.items():
             table.add_row(name, f"{value:.4f}" if isinstance(value, float) else str(value))
         Console().print(table)

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
+from bms.commands.options import DataOption
 from bms.errors import InputError
 from bms.kan.build import model_for_measurements, model_for_preset
 from bms.kan.model_file import KanModel, save_model
@@ -26,12 +27,7 @@ def train(
     preset: Annotated[
         str | None, typer.Option("--preset", help="Simulate the data from it: name or .toml file.")
     ] = None,
-    data: Annotated[
-        Path | None,
-        typer.Option(
-            "--data", help="CSV: time_s, current_A, ..., core_temperature_K (s, A, W, K)."
-        ),
-    ] = None,
+    data: DataOption = None,
     seed: Annotated[int, typer.Option("--seed", help="Seed of data and training.")] = DEFAULTS.seed,
     width: Annotated[
         str, typer.Option("--width", help="Nodes of inputs and layers, such as 4,1,1.")
@@ -62,7 +58,7 @@ def train(
     )
     _require_writable(out)
     console = Console(stderr=True)
-    with Progress(console=console, transient=True) as bar:
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("Training", total=1.0)
 
         def progress(share: float) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -50,7 +51,7 @@ def read_measurements(path: Path) -> Measurements:
     a value that is not finite in place of a number, and time that does not rise.
     """
     rows = csv.reader(read_text(path).lstrip("\ufeff").splitlines())
-    header = [name.strip() for name in next(rows, [])]
+    header = [name.strip() for name in _next_row(rows, path) or []]
     missing = [name for name in COLUMNS if header.count(name) != 1]
     if missing:
         raise InputError(
@@ -59,7 +60,7 @@ def read_measurements(path: Path) -> Measurements:
         )
     places = [header.index(name) for name in COLUMNS]
     values: list[list[float]] = []
-    for cells in rows:
+    while (cells := _next_row(rows, path)) is not None:
         if not cells:
             continue
         where = f"{path}:{rows.line_num}"
@@ -75,9 +76,17 @@ def read_measurements(path: Path) -> Measurements:
     return Measurements(*np.array(values).T.copy())
 
 
+def _next_row(rows: Iterator[list[str]], path: Path) -> list[str] | None:
+    try:
+        return next(rows, None)
+    except csv.Error as error:
+        raise InputError(f"{path}: not valid CSV: {error}; mend the file") from None
+
+
 def _number(text: str, name: str, where: str) -> float:
     try:
-        value = float(text)
+        # Python alone takes 1_000 for a number.
+        value = math.nan if "_" in text else float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ from bms.errors import InputError, ModelMismatchError
 from bms.firmware._firmware import ffi, lib
 from bms.kan.model_file import KanModel, load_model, load_shipped_model
 from bms.presets import DEFAULT_PRESET, Preset, load_preset
-from bms.tables import calibration_fields
+from bms.tables import NO_CHANGES, calibration_fields
 
 
 def load_pair(
@@ -22,23 +23,34 @@ def load_pair(
     return chosen, load_shipped_model(chosen.name) if model is None else load_model(Path(model))
 
 
-def calibration_block(preset: Preset, model: KanModel, *, compiled_in: bool) -> Any:
+def calibration_block(
+    preset: Preset,
+    model: KanModel,
+    *,
+    compiled_in: bool,
+    changes: Mapping[str, float] = NO_CHANGES,
+) -> Any:
     """Pointer to a bms_calibration_t that stays valid as long as it is referenced.
 
-    With compiled_in, the block in the binary is used for the default preset, after a check that
-    preset and model are those it was generated from. Raises ModelMismatchError when they are not,
-    and InputError when the firmware refuses the block.
+    With compiled_in, the block in the binary is used for the preset and model that it was generated
+    from. Raises ModelMismatchError when they should be those of the default preset and are not,
+    and InputError when the firmware refuses the block. `changes` as in calibration_fields; they
+    need a block of their own, not the compiled-in one.
     """
-    if compiled_in and preset.name == DEFAULT_PRESET:
-        block = lib.host_default_calibration()
-        wanted = (int(model.hash[:8], 16), int(preset.hash[:8], 16))
-        if (block.model_hash, block.preset_hash) != wanted:
+    block = lib.host_default_calibration()
+    wanted = (int(model.hash[:8], 16), int(preset.hash[:8], 16))
+    if not compiled_in or (block.model_hash, block.preset_hash) != wanted:
+        # A changed copy of the default preset has its name, but not its hash.
+        if (
+            compiled_in
+            and preset.name == DEFAULT_PRESET
+            and preset.hash == load_preset(DEFAULT_PRESET).hash
+        ):
             raise ModelMismatchError(
                 f"compiled-in tables are not those of preset '{preset.name}' and its model; "
                 "run 'make generate' and install again"
             )
-    else:
-        block = ffi.new("bms_calibration_t *", calibration_fields(preset, model))
+        block = ffi.new("bms_calibration_t *", calibration_fields(preset, model, changes))
     if not lib.calibration_is_valid(block):
         raise InputError(
             f"preset '{preset.name}' with model {model.hash[:8]}: a constant is out of the range "

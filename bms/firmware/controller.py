@@ -39,7 +39,8 @@ class CompiledNetwork:
         self, inputs: npt.ArrayLike
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
         """Core temperature in K and domain flag, both (N,), for inputs (N, n_in)."""
-        rows = np.ascontiguousarray(inputs, dtype=np.float32)
+        with np.errstate(over="ignore"):  # what float32 cannot hold is out of the domain
+            rows = np.ascontiguousarray(inputs, dtype=np.float32)
         if rows.ndim != 2 or rows.shape[1] != self._inputs:
             raise ValueError(f"inputs must have shape (N, {self._inputs})")
         core, in_domain = np.empty(len(rows), np.float32), np.empty(len(rows), np.uint8)

@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from bms.firmware._firmware import ffi, lib
 from bms.firmware.calibration import calibration_block, load_pair
 from bms.kan.model_file import KanModel
 from bms.presets import Preset
+from bms.tables import NO_CHANGES
 
 MAX_DATA_LENGTH = 8
 
 
 class Ecu:
-    """One ECU with its own state. `preset` and `model` as in Firmware, with the same errors."""
+    """One ECU with its own state. `preset` and `model` as in Firmware, with the same errors.
+
+    `changes` sets constants of the controller to other values, for studies: the names are fields
+    of bms_calibration_t or of its barrier part, InputError for one that does not exist.
+    """
 
     def __init__(
-        self, preset: str | Path | Preset, model: str | Path | KanModel | None = None
+        self,
+        preset: str | Path | Preset,
+        model: str | Path | KanModel | None = None,
+        changes: Mapping[str, float] = NO_CHANGES,
     ) -> None:
         self.preset, self.model = load_pair(preset, model)
-        self._calibration = calibration_block(self.preset, self.model, compiled_in=model is None)
+        self._calibration = calibration_block(
+            self.preset,
+            self.model,
+            compiled_in=model is None and not changes,
+            changes=changes,
+        )
         self._state = ffi.new("bms_t *")
         self._frame = ffi.new("can_frame_t *")
         config = ffi.new("bms_config_t *", {"calibration": self._calibration})

@@ -7,7 +7,7 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Annotated
 
-from annotated_types import Ge, Le
+from annotated_types import Ge, Gt, Le
 
 from bms.cell import CellParameters
 from bms.errors import InputError
@@ -24,7 +24,7 @@ class Limits:
     """
 
     max_voltage_V: Positive
-    max_soc: Positive
+    max_soc: Annotated[float, Gt(0.0), Le(1.0)]
     max_core_temperature_K: Positive
     max_surface_temperature_K: Positive
     reference_current_A: Negative
@@ -78,8 +78,8 @@ class Uncertainty:
 class Timing:
     """Control period, and the longest time from a measurement to the current it leads to."""
 
-    sampling_period_s: Positive
-    delay_s: NonNegative
+    sampling_period_s: Annotated[float, Ge(0.001), Le(10.0)]
+    delay_s: Annotated[float, Ge(0.0), Le(10.0)]
 
 
 @strict
@@ -185,8 +185,20 @@ class Preset:
 
     @property
     def training_hash(self) -> str:
-        """SHA-256 of what the estimator's training data depends on: cell, uncertainty and box."""
-        return _digest([asdict(self.cell), asdict(self.uncertainty), asdict(self.operating_box)])
+        """SHA-256 of what an estimator and its error bound depend on.
+
+        The bound covers the errors of the sensors and full steps of the current, so both belong to
+        it as much as cell, uncertainty and box, from which training data are simulated.
+        """
+        return _digest(
+            [
+                asdict(self.cell),
+                asdict(self.uncertainty),
+                asdict(self.operating_box),
+                asdict(self.sensors),
+                self.limits.reference_current_A,
+            ]
+        )
 
 
 def _digest(content: object) -> str:

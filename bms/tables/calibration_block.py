@@ -6,6 +6,8 @@ time and is printed as a C initialiser by codegen.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from bms.barrier import barrier_constants, sampling_margins
@@ -39,6 +41,9 @@ _DEVIATIONS = {
 }
 
 
+NO_CHANGES: Mapping[str, float] = MappingProxyType({})
+
+
 def check_pair(preset: Preset, model: KanModel) -> None:
     """Raise ModelMismatchError when the model was trained for another cell or box."""
     if tuple(model.network.input_names) != INPUT_NAMES:
@@ -54,15 +59,19 @@ def check_pair(preset: Preset, model: KanModel) -> None:
         )
 
 
-def calibration_fields(preset: Preset, model: KanModel) -> dict[str, Any]:
+def calibration_fields(
+    preset: Preset, model: KanModel, changes: Mapping[str, float] = NO_CHANGES
+) -> dict[str, Any]:
     """Content of bms_calibration_t as nested mapping, lists and numbers.
 
-    Raises ModelMismatchError for a stale pair and InputError for what does not fit the maxima.
+    `changes` are constants of the controller, by field name, that a study sets to other values.
+    Raises ModelMismatchError for a stale pair and InputError for what does not fit the maxima or
+    for a change of a constant that does not exist.
     """
     check_pair(preset, model)
     if len(preset.cell.ocv.soc) > MAX_OCV_POINTS:
         raise InputError(f"preset '{preset.name}': cell.ocv: at most {MAX_OCV_POINTS} points")
-    return {
+    fields: dict[str, Any] = {
         "layout": LAYOUT,
         "model_hash": int(model.hash[:8], 16),
         "preset_hash": int(preset.hash[:8], 16),
@@ -74,6 +83,12 @@ def calibration_fields(preset: Preset, model: KanModel) -> dict[str, Any]:
         "plausibility": _plausibility_fields(preset),
         "kan": network_tables(model.network).fields(model.network),
     }
+    for name, value in changes.items():
+        section = fields["rcbf"] if name in fields["rcbf"] else fields
+        if not isinstance(section.get(name), float):
+            raise InputError(f"calibration: no constant '{name}' to change; see bms_calibration_t")
+        section[name] = type(section[name])(value)
+    return fields
 
 
 def _barrier_fields(preset: Preset, error_bound_K: float) -> dict[str, Any]:

@@ -4,8 +4,12 @@
 
 #include "numeric.h"
 
-/* Beyond this no input is physical, and products of inputs could overflow. */
-#define RCBF_INPUT_LIMIT 1e4
+/* Beyond these no input is physical, and none inside can make a product overflow. */
+#define COLDEST_K 150.0
+#define HOTTEST_K 450.0
+#define LOWEST_SOC (-0.1)
+#define HIGHEST_SOC 1.1
+#define LARGEST_INPUT 1e4
 
 /* constant + linear u + quadratic u^2 >= 0 with quadratic <= 0 */
 typedef struct {
@@ -110,16 +114,19 @@ static float value_at(const concave_t *f, float u)
     return (float)f->constant + u * (f->linear + u * f->quadratic);
 }
 
+static bool is_within(double value, double low, double high)
+{
+    return (value >= low) && (value <= high);
+}
+
 static bool is_physical(const rcbf_input_t *in)
 {
-    const double values[] = { in->core_temperature_K,          in->surface_temperature_K,
-                              in->coolant_temperature_K,       (double)in->cooling_power_W,
-                              (double)in->reference_current_A, (double)in->soc };
-    bool physical = in->reference_current_A <= 0.0f;
-    for (uint32_t i = 0u; i < sizeof values / sizeof values[0]; i++) {
-        physical = physical && (values[i] <= RCBF_INPUT_LIMIT) && (values[i] >= -RCBF_INPUT_LIMIT);
-    }
-    return physical;
+    return is_within(in->core_temperature_K, COLDEST_K, HOTTEST_K) &&
+           is_within(in->surface_temperature_K, COLDEST_K, HOTTEST_K) &&
+           is_within(in->coolant_temperature_K, COLDEST_K, HOTTEST_K) &&
+           is_within((double)in->soc, LOWEST_SOC, HIGHEST_SOC) &&
+           is_within((double)in->cooling_power_W, -LARGEST_INPUT, LARGEST_INPUT) &&
+           is_within((double)in->reference_current_A, -LARGEST_INPUT, 0.0);
 }
 
 rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t *input)

@@ -17,7 +17,7 @@ from hil_sim.session import ControllerKind, Settings, run_both
 def sil(
     controller: Annotated[
         ControllerKind,
-        typer.Option("--controller", help="kan-rcbf is the C firmware; s-cbf a Python baseline."),
+        typer.Option("--controller", help="kan-rcbf is the C firmware, others Python baselines."),
     ] = ControllerKind.KAN_RCBF,
     baseline: Annotated[
         ControllerKind | None,
@@ -36,8 +36,8 @@ def sil(
     """Charge a simulated cell over a CAN bus with the ECU in the same process.
 
     Temperatures in K, currents in A (negative while charging), times in s from the start of the
-    charge. Baselines know the true state of the cell, as their method assumes; the firmware sees
-    the bus only. Exit code 1 when the controller lets a limit be crossed or the charge fails.
+    charge. The S-CBF baselines know the true state of the cell, as their method assumes; all others
+    see the bus only. Exit code 1 when the controller lets a limit be crossed or the charge fails.
 
     Example: bms sil --baseline s-cbf --disturbance bang-bang --out out/run
     """

@@ -15,6 +15,7 @@ SYNC_ID = 0x080
 """Start of a control period in lock step (CiA 301)."""
 
 _LONGEST_START_FRAMES = 1000
+_MOST_FRAMES_A_PERIOD = 1000
 
 
 class EcuLike(Protocol):
@@ -53,24 +54,34 @@ class EcuNode:
         self._await_gap(0.5 * poll_s)
         silent_s = 0.0
         while not stopped() and not (self.frames and silent_s >= silence_s):
-            seen = self.frames
-            if self.answer(poll_s) or self.frames > seen:
-                silent_s = 0.0
-            else:
+            frame = self._bus.receive(poll_s)
+            if frame is None:
                 silent_s += poll_s
+                continue
+            silent_s = 0.0
+            if self._take(frame):
+                self._step()
 
     def run_on_clock(
         self, period_s: float, clock: Clock, silence_s: float, stopped: Callable[[], bool]
     ) -> None:
-        """Step once a period by the clock, without SYNC; ends as `run` does."""
+        """Step once a period by the clock, without SYNC; ends as `run` does.
+
+        The first frame sets the phase: steps fall midway between the plant's measurements, so that
+        clocks that run apart do not soon leave a period without any. After a stall the missed
+        periods are not caught up.
+        """
         due_s = last_frame_s = clock.now_s()
         while not stopped() and not (self.frames and due_s - last_frame_s >= silence_s):
-            due_s += period_s
-            while (left_s := due_s - clock.now_s()) > 0.0:
-                frame = self._bus.receive(left_s)
-                if frame is not None:
-                    self._take(frame)
-                    last_frame_s = due_s
+            due_s = max(due_s + period_s, clock.now_s())
+            for _ in range(_MOST_FRAMES_A_PERIOD):
+                frame = self._bus.receive(max(0.0, due_s - clock.now_s()))
+                if frame is None:
+                    break
+                if not self.frames:
+                    due_s = clock.now_s() + 0.5 * period_s
+                self._take(frame)
+                last_frame_s = due_s
             if self.frames:
                 self._step()
 

@@ -13,7 +13,7 @@ from bms.presets.schema import Limits
 from hil_sim.result import RunResult
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers and in grey.
-CONTROLLER_COLOURS = ("#0072B2", "#D55E00")
+CONTROLLER_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
 ESTIMATE_COLOUR, LIMIT_COLOUR = "#000000", "#7A1F5C"
 _DPI = 130
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
-from bms import __version__
 from hil_sim.report.chart import charge_chart, estimate_chart
 from hil_sim.report.figures import figures, seconds_by_constraint
 from hil_sim.report.folder import OutputFolder
+from hil_sim.report.page import data_url, render_page
 from hil_sim.result import RunResult
 from hil_sim.session import Settings
 
@@ -36,17 +33,10 @@ def write_report(folder: OutputFolder, settings: Settings, results: list[RunResu
 
 def report_page(settings: Settings, results: list[RunResult], chart: bytes) -> str:
     """The self-contained HTML page of a run."""
-    environment = Environment(
-        loader=PackageLoader("hil_sim", "report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     preset, first = settings.preset, results[0].summary
     has_estimate = first.kan_rmse_K is not None
-    return environment.get_template("report.html.j2").render(
-        version=__version__,
+    return render_page(
+        "report.html.j2",
         settings=settings,
         preset=preset,
         results=results,
@@ -59,10 +49,6 @@ def report_page(settings: Settings, results: list[RunResult], chart: bytes) -> s
                 result, preset.timing.sampling_period_s
             ).items()
         ],
-        chart=_data_url(chart),
-        estimate_chart=_data_url(estimate_chart(results[0])) if has_estimate else None,
+        chart=data_url(chart),
+        estimate_chart=data_url(estimate_chart(results[0])) if has_estimate else None,
     )
-
-
-def _data_url(png: bytes) -> str:
-    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")

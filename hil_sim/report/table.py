@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from hil_sim.report.figures import figures
@@ -17,7 +18,8 @@ def print_table(
 ) -> None:
     """Figures of each run beside their limits, the verdict, and where the report lies."""
     preset, first = settings.preset, results[0].summary
-    table = Table(title=f"Charge of '{preset.name}' over {settings.bus}", title_justify="left")
+    title = escape(f"Charge of '{preset.name}' over {settings.bus}")
+    table = Table(title=title, title_justify="left")
     table.add_column("")
     for result in results:
         table.add_column(result.summary.controller, justify="right")
@@ -35,4 +37,4 @@ def print_table(
         reasons = "; ".join(first.failures)
         console.print(f"[red]{first.controller}: check failed: {reasons}[/red]")
     if out is not None:
-        console.print(f"report: {out / 'report.html'}", soft_wrap=True)
+        console.print(f"report: {out / 'report.html'}", soft_wrap=True, markup=False)

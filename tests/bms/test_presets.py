@@ -199,6 +199,8 @@ def test_the_hash_changes_with_every_number(load, path):
         (("cell", "ohmic_resistance_ohm"), 0.02, False),
         (("operating_box", "cooling_power_W"), [0.0, 9.0], False),
         (("uncertainty", "core_K_per_s"), 1e-3, False),
+        (("sensors", "surface_temperature_K", "noise_std"), 0.3, False),
+        (("limits", "reference_current_A"), -20.0, False),
         (("limits", "max_core_temperature_K"), 320.0, True),
         (("description",), "other words", True),
     ],

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from bms.kan import shipped_model_path
+from bms.presets import preset_path
+
 STABLE_KEYS = [
     "controller",
     "preset",
@@ -123,27 +126,26 @@ def test_wrong_use_is_one_line_on_stderr_and_exit_code_2(arguments, said, tmp_pa
 
 def test_a_preset_with_a_date_for_a_number_is_refused_by_key(tmp_path):
     text = preset_path("lin2014").read_text()
-    (tmp_path / "mine.toml").write_text(text.replace("capacity_Ah = 2.3", "capacity_Ah = 2026-01-01"))
+    (tmp_path / "mine.toml").write_text(
+        text.replace("capacity_Ah = 2.3", "capacity_Ah = 2026-01-01")
+    )
     done = bms("sil", "--preset", tmp_path / "mine.toml")
     assert done.returncode == 2
     assert "cell.capacity_Ah" in done.stderr
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_a_changed_copy_of_the_default_preset_runs_with_its_own_constants(tmp_path):
-    text = preset_path("paper_calibrated").read_text()
-    assert "reference_current_A = -23.0" in text
-    (tmp_path / "[mine].toml").write_text(
-        text.replace("reference_current_A = -23.0", "reference_current_A = -2.0").replace(
-            'name = "paper_calibrated"', 'name = "paper_calibrated[/bold]"'
-        )
+def test_names_with_brackets_are_shown_as_they_are(tmp_path):
+    text = preset_path("lin2014").read_text()
+    (tmp_path / "mine.toml").write_text(text.replace('name = "lin2014"', 'name = "mine[/bold]"'))
+    model, out = shipped_model_path("lin2014"), tmp_path / "[red]"
+    done = bms(
+        *("sil", "--preset", tmp_path / "mine.toml", "--model", model),
+        *("--max-time-s", 1, "--out", out),
     )
-    model = shipped_model_path("paper_calibrated")
-    named = bms(
-        "sil", "--preset", tmp_path / "[mine].toml", "--model", model, "--max-time-s", 3
-    )
-    assert (named.returncode, named.stderr) == (0, "")
-    assert "paper_calibrated[/bold]" in named.stdout
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "mine[/bold]" in done.stdout
+    assert str(out / "report.html") in done.stdout
 
 
 def test_an_unusable_bus_leaves_no_output_folder(tmp_path):

@@ -1,0 +1,143 @@
+"""`bms verify`: a machine-checked argument that decisions keep the barriers."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from bms.presets import DEFAULT_PRESET
+from bms.verification import CLASHING_DELTA4, SLIPS, Formulas, Verification, slips_of
+from bms.verification.search import CounterExample
+
+CERTIFIED, NOT_CERTIFIED = 0, 1
+
+
+def verify(
+    preset: Annotated[
+        str, typer.Option("--preset", help="Preset by name or TOML file.")
+    ] = DEFAULT_PRESET,
+    model: Annotated[
+        Path | None, typer.Option("--model", help="Model (JSON); none: the preset's own.")
+    ] = None,
+    formulas: Annotated[
+        Formulas, typer.Option("--formulas", help="paper: with the slips of the printed formulas.")
+    ] = Formulas.CORRECTED,
+    slips: Annotated[
+        bool, typer.Option("--slips", help="Also charge with each slip and show what it costs.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+) -> int:
+    """Certify that no decision lets a limit be crossed before the next decision acts.
+
+    Branch and bound in interval arithmetic over all states (K), currents (A) and cooling (W), with
+    all disturbances, reading errors and estimation errors at their bounds. Exit code 1 when a
+    barrier cannot be certified; a counter-example is a state that fails in simulation.
+
+    Example: bms verify --preset lin2014 --json
+    """
+    # Imported here, so that the other commands start where the firmware is not compiled.
+    from bms.firmware.calibration import load_pair  # noqa: PLC0415
+    from bms.verification.closed_loop import slip_cost  # noqa: PLC0415
+    from bms.verification.verify import verify as certify  # noqa: PLC0415
+
+    pair = load_pair(preset, model)
+    result = certify(*pair, slips_of(formulas))
+    costs = []
+    if slips:
+        for chosen in ((), *((slip,) for slip in (*SLIPS, CLASHING_DELTA4)), SLIPS):
+            costs.append(slip_cost(*pair, chosen, certify(*pair, chosen).certified))
+    if as_json:
+        content = result.as_dict()
+        if costs:
+            content["slips"] = [asdict(cost) for cost in costs]
+        typer.echo(json.dumps(content, indent=1))
+    else:
+        _print(result)
+        if costs:
+            table = Table(
+                "slip", "certified", "core excess K", "surface excess K", "voltage excess V",
+                "charge s", "core peak K", "surface peak K",
+            )  # fmt: skip
+            for cost in costs:
+                time_s = cost.charge_time_s
+                table.add_row(
+                    cost.slip,
+                    "yes" if cost.certified else "no",
+                    f"{cost.core_excess_K:+.5f}",
+                    f"{cost.surface_excess_K:+.5f}",
+                    f"{cost.voltage_excess_V:+.5f}",
+                    f"{time_s:.1f}" if time_s is not None else f"soc {cost.soc:.2f} in 1800 s",
+                    f"{cost.core_peak_K:.3f}",
+                    f"{cost.surface_peak_K:.3f}",
+                )
+            Console().print(table)
+    return CERTIFIED if result.certified else NOT_CERTIFIED
+
+
+def _print(result: Verification) -> None:
+    console = Console()
+    table = Table("barrier", "certified", "boxes", "open", "counter-example")
+    for barrier in result.barriers:
+        certificate = barrier.certificate
+        table.add_row(
+            barrier.name,
+            "yes" if certificate.holds else "no",
+            str(certificate.boxes),
+            str(certificate.open_boxes),
+            _example(barrier.counter_example),
+        )
+    console.print(table)
+    for barrier in result.barriers:
+        if barrier.domain is not None:
+            domain = barrier.domain
+            core_low, core_high = domain.core_gap_K
+            coolant_low, coolant_high = domain.coolant_gap_K
+            console.print(
+                f"{barrier.name}: Ts {domain.low.surface_K:g}..{domain.high.surface_K:g} K, Tc - Ts "
+                f"{core_low:.3f}..{core_high:.3f} K, Ts - Tinf {coolant_low:.3f}.."
+                f"{coolant_high:.3f} K, condition falling by at most {domain.flows[0].largest:.4g}/s"
+            )
+        low, high = barrier.certificate.open_low, barrier.certificate.open_high
+        if low is not None and high is not None:
+            sides = zip(low._fields, low, high)
+            console.print(
+                f"{barrier.name}: not shown for "
+                + ", ".join(f"{name} {a:.3f}..{b:.3f}" for name, a, b in sides)
+            )
+        if barrier.outside is not None:
+            console.print(f"{barrier.name}: beyond its domain {_example(barrier.outside)}")
+    margins = ", ".join(f"{name} {value:.4g}" for name, value in result.margins.items())
+    console.print(f"margins: {margins}; error bound {result.error_bound_K:.4f} K")
+    part = result.fallback
+    worst = ", ".join(
+        f"{o.surface_K * 1e3:.2f} mK surface and {o.core_K * 1e3:.2f} mK core after {o.time_s:g} s"
+        for o in part.overshoots
+    )
+    console.print(
+        f"no current is safe within {part.core_band_K:.3f} K (core) or {part.surface_band_K:.3f} K "
+        f"(surface) below the limit at uniform temperature; 0 A from any safe state exceeds by at "
+        f"most {worst}; {part.best_current_A:.2f} A would heat the core "
+        f"{part.best_gain_K_per_s:.1e} K/s less"
+    )
+    verdict = "certified" if result.certified else "NOT certified"
+    formulas = ", ".join(result.slips) or "corrected"
+    console.print(
+        f"{result.preset} ({formulas}): {verdict} for {result.held_s:g} s from each reading, "
+        f"{result.wall_time_s:.1f} s"
+    )
+
+
+def _example(example: CounterExample | None) -> str:
+    if example is None:
+        return ""
+    return (
+        f"Tc {example.core_temperature_K:.4f} K, Ts {example.surface_temperature_K:.4f} K, Tinf "
+        f"{example.coolant_temperature_K:.4f} K, soc {example.soc:.3f}, {example.current_A:.3f} A: "
+        f"barrier {example.value:.2e} within {example.hold_s:g} s"
+    )

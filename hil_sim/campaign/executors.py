@@ -1,0 +1,75 @@
+"""Who does the work: this process, processes on this machine, or a Dask cluster."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from bms.errors import InputError
+
+T = TypeVar("T")
+_CONNECT_TIMEOUT_S = 10.0
+
+
+@dataclass(frozen=True)
+class Workforce:
+    """An executor, and how many pieces it should have at hand."""
+
+    executor: Executor
+    pieces_at_hand: int
+
+
+class InlineExecutor(Executor):
+    """Does each piece at once in the caller's own thread."""
+
+    def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
+        """The finished future of a call; an interrupt passes through."""
+        future: Future[T] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+def _leave_interrupts_to_the_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def local_workforce(jobs: int) -> Iterator[Workforce]:
+    """Processes on this machine; a single job runs in this one."""
+    if jobs == 1:
+        yield Workforce(InlineExecutor(), 1)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, context, _leave_interrupts_to_the_parent) as executor:
+        yield Workforce(executor, 2 * jobs)
+
+
+@contextmanager
+def dask_workforce(address: str) -> Iterator[Workforce]:
+    """Workers of a Dask cluster by the address of its scheduler, such as tcp://host:8786.
+
+    The workers need this package. Raises InputError when Dask is not installed or nobody answers.
+    """
+    try:
+        from distributed import Client  # noqa: PLC0415 (an optional extra)
+    except ImportError:
+        raise InputError(
+            "--scheduler: dask.distributed is not installed; pip install 'kan-rcbf-bms[dask]'"
+        ) from None
+    make_client: Any = Client
+    try:
+        client = make_client(address, timeout=_CONNECT_TIMEOUT_S)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"--scheduler {address}: no scheduler answers ({' '.join(str(error).split())}); "
+            "start 'dask scheduler' and 'dask worker' first"
+        ) from None
+    with client:
+        threads = max(1, sum(client.nthreads().values()))
+        with client.get_executor() as executor:
+            yield Workforce(executor, 2 * threads)

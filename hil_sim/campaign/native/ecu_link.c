@@ -1,0 +1,85 @@
+#include "ecu_link.h"
+
+#include <math.h>
+
+#include "can_catalog.h"
+#include "can_db.h"
+
+static double raw_of(const link_signal_t *signal, double value)
+{
+    const double steps = (value - signal->offset) / signal->scale;
+    return rint(fmin(fmax(steps, signal->lowest), signal->highest));
+}
+
+double link_over_the_bus(const link_signal_t *signal, double value)
+{
+    return raw_of(signal, value) * signal->scale + signal->offset;
+}
+
+static void send(link_t *link, uint32_t index, can_frame_t *frame)
+{
+    const codec_message_t *message = &CAN_RECEIVED[index];
+    frame->id = message->id;
+    frame->length = message->length;
+    e2e_protect(frame->data, frame->length, message->data_ids, link->counter);
+    bms_receive(&link->bms, frame);
+}
+
+static void send_readings(link_t *link, const link_signals_t *signals,
+                          const double readings[LINK_READINGS])
+{
+    uint16_t raw[LINK_READINGS];
+    for (uint32_t i = 0u; i < LINK_READINGS; i++) {
+        raw[i] = (uint16_t)raw_of(&signals->readings[i], readings[i]);
+    }
+    can_frame_t frame = { 0 };
+    const struct can_db_cell_electrical_t electrical = { .current = raw[0], .voltage = raw[1] };
+    (void)can_db_cell_electrical_pack(frame.data, &electrical, sizeof frame.data);
+    send(link, CAN_RECEIVED_CELL_ELECTRICAL, &frame);
+    const struct can_db_cell_thermal_t thermal = { .surface_temperature = raw[2],
+                                                   .coolant_temperature = raw[3] };
+    (void)can_db_cell_thermal_pack(frame.data, &thermal, sizeof frame.data);
+    send(link, CAN_RECEIVED_CELL_THERMAL, &frame);
+    const struct can_db_coolant_t coolant = { .cooling_power = raw[4] };
+    (void)can_db_coolant_pack(frame.data, &coolant, sizeof frame.data);
+    send(link, CAN_RECEIVED_COOLANT, &frame);
+}
+
+static link_answer_t hear(link_t *link, const link_signals_t *signals)
+{
+    const codec_message_t *message = &CAN_TRANSMITTED[CAN_TRANSMITTED_CHARGE_COMMAND];
+    link_answer_t answer = { false, 0.0, BMS_INIT };
+    can_frame_t frame;
+    while (bms_transmit(&link->bms, &frame)) {
+        if ((frame.id != message->id) ||
+            (e2e_check(&link->command_e2e, frame.data, frame.length, message->length,
+                       message->data_ids, 1u) != E2E_OK)) {
+            continue;
+        }
+        struct can_db_charge_command_t command;
+        (void)can_db_charge_command_unpack(&command, frame.data, frame.length);
+        const link_signal_t *signal = &signals->command_current;
+        answer.intact = (double)command.command_current <= signal->highest;
+        answer.command_A = command.command_current * signal->scale + signal->offset;
+        answer.state = command.command_state;
+    }
+    return answer;
+}
+
+link_answer_t link_exchange(link_t *link, const link_signals_t *signals,
+                            const double readings[LINK_READINGS], bool charge,
+                            double reference_current_A, double plug_in_soc)
+{
+    send_readings(link, signals, readings);
+    can_frame_t frame = { 0 };
+    const struct can_db_charge_request_t request = {
+        .request = charge ? REQUEST_CHARGE : REQUEST_OFF,
+        .reference_current = (uint16_t)raw_of(&signals->reference_current, reference_current_A),
+        .plug_in_state_of_charge = (uint16_t)raw_of(&signals->plug_in_soc, plug_in_soc),
+    };
+    (void)can_db_charge_request_pack(frame.data, &request, sizeof frame.data);
+    send(link, CAN_RECEIVED_CHARGE_REQUEST, &frame);
+    link->counter++;
+    bms_step(&link->bms);
+    return hear(link, signals);
+}

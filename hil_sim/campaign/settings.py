@@ -1,0 +1,57 @@
+"""What determines a campaign, and with it every byte of its runs.csv."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from bms.errors import InputError
+from bms.kan.model_file import KanModel
+from bms.presets import Preset
+
+CHUNK_RUNS = 20
+"""Runs that a worker does in one piece and that are stored together; about a second of work."""
+
+
+@dataclass(frozen=True)
+class CampaignSettings:
+    """A campaign. `firmware_changes` sets constants of the firmware to other values, for studies.
+
+    Raises InputError when there is nothing to run.
+    """
+
+    preset: Preset
+    model: KanModel
+    runs: int
+    seed: int = 0
+    max_time_s: float = 3600.0
+    firmware_changes: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.runs < 1:
+            raise InputError(f"campaign of {self.runs} runs: at least 1 is needed")
+
+    def identity(self) -> dict[str, Any]:
+        """Everything that the results depend on, as plain JSON; stored beside them."""
+        return {
+            "preset": self.preset.name,
+            "preset_hash": self.preset.hash,
+            "model_hash": self.model.hash,
+            "runs": self.runs,
+            "seed": self.seed,
+            "max_time_s": self.max_time_s,
+            "firmware_changes": dict(self.firmware_changes),
+        }
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the identity, as hexadecimal text."""
+        return hashlib.sha256(json.dumps(self.identity(), sort_keys=True).encode()).hexdigest()
+
+    def chunks(self) -> list[range]:
+        """The runs in pieces of CHUNK_RUNS."""
+        starts = range(0, self.runs, CHUNK_RUNS)
+        return [range(start, min(start + CHUNK_RUNS, self.runs)) for start in starts]

@@ -1,0 +1,109 @@
+"""`bms reproduce`: the paper's table and figures beside ours."""
+
+from __future__ import annotations
+
+import json as json_format
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.presets import Preset, load_preset
+from hil_sim.commands import options
+from hil_sim.report.folder import OutputFolder
+from hil_sim.reproduction.files import CAUTION, content_json, write_reproduction
+from hil_sim.reproduction.runs import PRESETS, Case, Results, all_cases, run_cases
+from hil_sim.reproduction.sections import BAD, Section, passed, sections
+
+
+def reproduce(
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            help="Folder for report.html, reproduce.json, reproduce.csv and the pictures. "
+            "Default: nothing is written.",
+        ),
+    ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print the result as JSON and nothing else.")
+    ] = False,
+    seed: options.SeedOption = 0,
+    jobs: Annotated[
+        int | None,
+        typer.Option("--jobs", min=1, help="Charges at a time. Default: one for each processor."),
+    ] = None,
+    max_time_s: options.MaxTimeOption = 3600.0,
+) -> int:
+    """Run the paper's comparison on both presets and show its figures beside ours.
+
+    Every controller charges under every disturbance; then the firmware charges without one of its
+    margins at a time, which shows what that margin costs. Peaks in K, times in s from the start of
+    the charge. Exit code 1 when the firmware lets a limit be crossed or a charge of it fails.
+
+    Example: bms reproduce --out out/reproduce
+    """
+    cases, presets = all_cases(), [load_preset(name) for name in PRESETS]
+    with OutputFolder(out) if out is not None else nullcontext() as folder:
+        results = _run(cases, seed, jobs or os.cpu_count() or 1, max_time_s)
+        if folder is not None:
+            write_reproduction(folder, presets, results, seed)
+            folder.commit()
+    if json:
+        print(json_format.dumps(content_json(presets, results, seed), indent=2))
+    else:
+        _print(Console(), presets, results, out)
+    return EXIT_DONE if passed(results) else EXIT_CHECK_FAILED
+
+
+def _run(cases: Sequence[Case], seed: int, jobs: int, max_time_s: float) -> Results:
+    """Run with a bar of the charges done on a terminal."""
+    if not sys.stderr.isatty():
+        return run_cases(cases, seed, jobs, max_time_s)
+    columns = (TextColumn("charges"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("charges", total=len(cases))
+        return run_cases(cases, seed, jobs, max_time_s, lambda: bar.advance(task))
+
+
+def _print(console: Console, presets: Sequence[Preset], results: Results, out: Path | None) -> None:
+    for preset in presets:
+        for section in sections(preset, results):
+            console.print(_table(section))
+            for note in section.notes:
+                console.print(f"  {note}", markup=False, highlight=False)
+            console.print()
+    console.print(CAUTION, markup=False, highlight=False)
+    if passed(results):
+        console.print("KAN-rCBF kept every limit in every charge")
+    else:
+        console.print("[red]KAN-rCBF: check failed, see the figures in red[/red]")
+    if out is not None:
+        console.print(f"report: {out / 'report.html'}", soft_wrap=True, markup=False)
+
+
+def _table(section: Section) -> Table:
+    title = escape(section.title)
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=0)
+    for number, column in enumerate(section.columns):
+        is_name = number == 0
+        table.add_column(escape(column), justify="left" if is_name else "right", no_wrap=is_name)
+    for row in section.rows:
+        table.add_row(*(_cell(text) for text in row))
+    return table
+
+
+def _cell(text: str) -> str:
+    if text.endswith(BAD):
+        return f"[red]{escape(text)}[/red]"
+    return escape(text)

@@ -1,0 +1,1 @@
+"""The paper's table and figures beside ours: runs, comparison, causes, files."""

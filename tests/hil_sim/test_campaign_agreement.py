@@ -1,0 +1,109 @@
+"""A charge of the campaign's C runner is the charge that runs over the bus, bit by bit."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from bms.cell import CellState
+from bms.kan.model_file import load_shipped_model
+from bms.presets import load_preset
+from hil_sim.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
+from hil_sim.campaign.settings import CampaignSettings
+from hil_sim.disturbances import DisturbanceKind, disturbance_source
+from hil_sim.session import ControllerKind, Settings, run_both
+
+SEED = 5
+BLOCK = 500
+FULL_S = 3600.0
+
+
+def noise(preset, kind):
+    """The random numbers of run_both for SEED: first knot, then blocks of normals and knots."""
+    step_s = preset.timing.sampling_period_s / SUB_STEPS
+    disturbance, sensors = (
+        np.random.default_rng(child) for child in np.random.SeedSequence(SEED).spawn(2)
+    )
+    source = disturbance_source(kind, preset, step_s, disturbance)
+    yield np.array(next(source), dtype=float)
+    while True:
+        knots = np.array(list(itertools.islice(source, BLOCK * SUB_STEPS)), dtype=float)
+        yield sensors.standard_normal((BLOCK, 5)), knots
+
+
+def start_of(preset):
+    start = preset.initial
+    return CellState(start.soc, *[start.temperature_K] * 3)
+
+
+def charge_in_c(preset, controller, kind, max_time_s):
+    settings = CampaignSettings(
+        preset, load_shipped_model(preset.name), runs=1, max_time_s=max_time_s
+    )
+    numbers = noise(preset, kind)
+    charge = CampaignCharge(
+        Scenario(settings),
+        controller.value,
+        preset.cell,
+        start_of(preset),
+        preset.initial.cooling_power_W,
+        next(numbers),
+    )
+    trace = []
+    for normals, knots in numbers:
+        for i in range(BLOCK):
+            state = charge.fields.state
+            trace.append((state.soc, state.core, state.surface, state.coolant))
+            charge.advance(normals[i : i + 1], knots[i * SUB_STEPS : (i + 1) * SUB_STEPS])
+            trace[-1] += (charge.fields.current_A,)
+            if charge.is_over:
+                return charge, trace
+
+
+@pytest.mark.parametrize(
+    ("name", "controller", "kind", "max_time_s"),
+    [
+        ("paper_calibrated", ControllerKind.KAN_RCBF, DisturbanceKind.BANG_BANG, FULL_S),
+        ("paper_calibrated", ControllerKind.S_CBF, DisturbanceKind.UPWARD, FULL_S),
+        ("paper_calibrated", ControllerKind.CC_CV, DisturbanceKind.UPWARD, FULL_S),
+        ("lin2014", ControllerKind.KAN_RCBF, DisturbanceKind.UPWARD, FULL_S),
+        ("lin2014", ControllerKind.KAN_RCBF, DisturbanceKind.GAUSSIAN, 100.0),
+        ("lin2014", ControllerKind.S_CBF, DisturbanceKind.BANG_BANG, 100.0),
+        ("lin2014", ControllerKind.CC_CV, DisturbanceKind.BANG_BANG, 100.0),
+    ],
+)
+def test_every_period_is_that_of_the_run_over_the_bus(name, controller, kind, max_time_s):
+    preset = load_preset(name)
+    charge, trace = charge_in_c(preset, controller, kind, max_time_s)
+    result = run_both(
+        Settings(
+            preset,
+            controller=controller,
+            seed=SEED,
+            disturbance=kind,
+            max_time_s=max_time_s,
+        )
+    )
+    summary, series, fields = result.summary, result.series, charge.fields
+    assert trace == list(
+        zip(
+            series.soc,
+            series.core_temperature_K,
+            series.surface_temperature_K,
+            series.coolant_temperature_K,
+            series.current_A,
+        )
+    )
+    assert (charge.outcome, fields.periods) == (summary.stop_reason, summary.steps)
+    assert fields.peaks.core_temperature_K == summary.max_core_temperature_K
+    assert fields.peaks.surface_temperature_K == summary.max_surface_temperature_K
+    assert fields.peaks.voltage_V == summary.max_voltage_V
+    assert fields.peaks.soc == summary.max_soc
+    assert fields.time_s == pytest.approx(series.time_s[-1])
+    assert fields.first_derate_s == pytest.approx(summary.first_derate_s or -1.0)
+    if controller is ControllerKind.KAN_RCBF:
+        half_a_step_K = 0.0026
+        assert fields.peaks.estimate_error_K == pytest.approx(
+            summary.kan_max_abs_error_K, abs=half_a_step_K
+        )
+        assert fields.infeasible_periods == summary.infeasible_steps
