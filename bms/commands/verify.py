@@ -99,9 +99,9 @@ def _print(result: Verification) -> None:
             core_low, core_high = domain.core_gap_K
             coolant_low, coolant_high = domain.coolant_gap_K
             console.print(
-                f"{barrier.name}: Ts {domain.low.surface_K:g}..{domain.high.surface_K:g} K, Tc - Ts "
-                f"{core_low:.3f}..{core_high:.3f} K, Ts - Tinf {coolant_low:.3f}.."
-                f"{coolant_high:.3f} K, condition falling by at most {domain.flows[0].largest:.4g}/s"
+                f"{barrier.name}: domain Ts {domain.low.surface_K:g}..{domain.high.surface_K:g} K, "
+                f"Tc - Ts {core_low:.3f}..{core_high:.3f} K, Ts - Tinf {coolant_low:.3f}.."
+                f"{coolant_high:.3f} K, condition falls by at most {domain.flows[0].largest:.4g}/s"
             )
         low, high = barrier.certificate.open_low, barrier.certificate.open_high
         if low is not None and high is not None:

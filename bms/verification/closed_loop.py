@@ -35,7 +35,7 @@ NOMINAL = 0
 class SlipCost:
     """Largest excess over each limit (negative: room left) and the undisturbed charge.
 
-    charge_time_s is None when the undisturbed charge is not complete within half an hour; soc is
+    charge_time_s is None when the undisturbed charge is not complete within the horizon; soc is
     what it reached then. The excess is over all eight charges.
     """
 
@@ -51,15 +51,25 @@ class SlipCost:
 
 
 def slip_cost(
-    preset: Preset, model: KanModel, slips: tuple[Slip, ...], certified: bool
+    preset: Preset,
+    model: KanModel,
+    slips: tuple[Slip, ...],
+    certified: bool,
+    horizon_s: float = HORIZON_S,
 ) -> SlipCost:
-    """Run the eight charges with slips in the constants."""
+    """Run the eight charges with slips in the constants, for horizon_s seconds at most."""
     constants = with_slips(preset, firmware_constants(preset, model), slips)
     name = "+".join(slip.name for slip in slips) or "none"
-    return _charges(preset, constants, name, certified)
+    return _charges(preset, constants, name, certified, horizon_s)
 
 
-def _charges(preset: Preset, constants: Mapping[str, Any], name: str, certified: bool) -> SlipCost:
+def _charges(
+    preset: Preset,
+    constants: Mapping[str, Any],
+    name: str,
+    certified: bool,
+    horizon_s: float,
+) -> SlipCost:
     cell, limits, timing = preset.cell, preset.limits, preset.timing
     errors, bounds, period_s = reading_errors(preset), preset.uncertainty, timing.sampling_period_s
     hot_K = limits.max_surface_temperature_K - HOT_START_BELOW_LIMIT_K
@@ -77,7 +87,7 @@ def _charges(preset: Preset, constants: Mapping[str, Any], name: str, certified:
     current_A = np.zeros(8)
     peaks = [start_K, start_K, np.full(8, -np.inf)]
     done_s = np.full(8, np.inf)
-    for step in range(round(HORIZON_S / period_s)):
+    for step in range(round(horizon_s / period_s)):
         complete = state.soc - counting >= limits.completion_soc
         done_s = np.where(complete & np.isinf(done_s), step * period_s, done_s)
         if np.all(complete):

@@ -85,10 +85,16 @@ class Verification:
         }
 
 
-def verify(preset: Preset, model: KanModel, slips: tuple[Slip, ...] = ()) -> Verification:
+def verify(
+    preset: Preset,
+    model: KanModel,
+    slips: tuple[Slip, ...] = (),
+    largest_boxes: int = LARGEST_BOXES,
+) -> Verification:
     """Certify the four barriers over one decision for the firmware's own constants.
 
-    With slips, for constants that contain them. Raises what loading the calibration raises.
+    With slips, for constants that contain them; a barrier is given up beyond largest_boxes. Raises
+    what loading the calibration raises.
     """
     begin = time.monotonic()
     constants = with_slips(preset, firmware_constants(preset, model), slips)
@@ -123,7 +129,7 @@ def verify(preset: Preset, model: KanModel, slips: tuple[Slip, ...] = ()) -> Ver
         results.append(
             BarrierResult(
                 name,
-                certify(domain, case, errors, LARGEST_BOXES),
+                certify(domain, case, errors, largest_boxes),
                 domain,
                 *(
                     find_counter_example(d, constants, errors, case.name, np.random.default_rng(0))

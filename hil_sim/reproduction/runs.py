@@ -77,19 +77,18 @@ def run_cases(
     """
     # A new interpreter for each process: a copy of this one could hold a lock of the progress bar.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, context, initializer=_leave_interrupts_to_parent) as pool:
+    pool = ProcessPoolExecutor(jobs, context, initializer=_leave_interrupts_to_parent)
+    try:
         futures = [pool.submit(run_case, case, seed, max_time_s) for case in cases]
-        try:
-            for future in as_completed(futures):
-                future.result()
-                on_done()
-        except BrokenProcessPool:
-            raise BmsError(
-                "a charge was ended by the system, perhaps for lack of memory; lower --jobs"
-            ) from None
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+        for future in as_completed(futures):
+            future.result()
+            on_done()
+    except BrokenProcessPool:
+        raise BmsError(
+            "a charge was ended by the system, perhaps for lack of memory; lower --jobs"
+        ) from None
+    finally:
+        pool.shutdown(cancel_futures=True)
     return {case: future.result() for case, future in zip(cases, futures)}
 
 

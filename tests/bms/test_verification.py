@@ -45,7 +45,7 @@ def corrected(name: str) -> Verification:
 
 @cache
 def printed(name: str) -> Verification:
-    return verify(*load_pair(name, None), SLIPS)
+    return verify(*load_pair(name, None), SLIPS, largest_boxes=50_000)
 
 
 def counter_examples(result: Verification) -> list[CounterExample]:
