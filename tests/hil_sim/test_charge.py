@@ -35,7 +35,6 @@ def test_a_full_charge_keeps_every_limit(any_preset, disturbance, charger_delay_
     assert summary.final_soc == pytest.approx(any_preset.limits.completion_soc, abs=2e-3)
     assert summary.kan_max_abs_error_K <= summary.error_bound_K
     assert 0.0 < summary.first_derate_s < summary.charge_time_s
-    assert summary.wall_time_s <= 10.0
 
 
 def test_limits_that_the_firmware_does_not_keep_are_seen(preset):
