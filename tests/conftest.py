@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
@@ -39,6 +40,5 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_report_header() -> str:
-    import bms.firmware._firmware as extension  # noqa: PLC0415  (must follow pytest_configure)
-
-    return f"firmware: {extension.__file__}"
+    import_module("bms.firmware")
+    return f"firmware: {sys.modules[EXTENSION].__file__}"
