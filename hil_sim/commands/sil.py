@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bms.errors import InputError
 from bms.presets import load_preset
 from hil_sim.commands import options
 from hil_sim.commands.outcome import charge_and_report
@@ -41,6 +42,11 @@ def sil(
 
     Example: bms sil --baseline s-cbf --disturbance bang-bang --out out/run
     """
+    if model is not None and ControllerKind.KAN_RCBF not in (controller, baseline):
+        raise InputError(
+            f"--model {model}: only {ControllerKind.KAN_RCBF.value} has an estimator; "
+            "leave it out or choose that controller"
+        )
     settings = Settings(
         preset=load_preset(preset),
         controller=controller,

@@ -109,6 +109,7 @@ no_can = pytest.mark.skipif(HAS_VCAN, reason="this machine has vcan0")
         (("ecu", "--bus", "nonsense:x", "--preset", "unheard-of"), "paper_calibrated"),
         (("sil", "--controller", "unheard-of"), "s-cbf"),
         (("sil", "--model", "not-there.json"), "not-there.json"),
+        (("sil", "--controller", "s-cbf", "--model", "not-there.json"), "kan-rcbf"),
         (("sil", "--disturbance", "unheard-of"), "bang-bang"),
         (("sil", "--seed", "-1"), "--seed"),
         (("sil", "--max-time-s", "soon"), "--max-time-s"),
