@@ -23,6 +23,7 @@ from bms.calibration.fit import (
 )
 from bms.calibration.preset_text import with_values
 from bms.errors import BmsError
+from bms.files import write_text
 from bms.presets import DEFAULT_PRESET, Preset, load_preset, preset_path
 from bms.validation import read_text
 
@@ -54,8 +55,7 @@ def run(
     console.print(_parameter_table(fitted))
     console.print(_figure_table(fitted, error_bound_K))
     if out is not None:
-        text = with_values(read_text(preset_path(preset)), _fitted_values(fitted))
-        out.write_text(text, encoding="utf-8")
+        write_text(out, with_values(read_text(preset_path(preset)), _fitted_values(fitted)))
 
 
 def _search(

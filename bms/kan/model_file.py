@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
-import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,6 +12,7 @@ from typing import Annotated, Any
 from annotated_types import Ge
 
 from bms.errors import InputError
+from bms.files import write_text
 from bms.kan.network import Network
 from bms.kan.settings import TrainingSettings
 from bms.validation import Finite, NonNegative, parse, read_json, strict
@@ -111,20 +110,7 @@ def load_model(path: Path) -> KanModel:
 
 def save_model(model: KanModel, path: Path) -> None:
     """Write the model as JSON, at once or not at all; InputError when the folder cannot be used."""
-    text = json.dumps({"hash": model.hash, **asdict(model)}, indent=1) + "\n"
-    temporary: str | None = None
-    try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".tmp")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except OSError as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
-        raise InputError(
-            f"{path}: cannot be written ({error.strerror}); choose a folder that can"
-        ) from None
+    write_text(path, json.dumps({"hash": model.hash, **asdict(model)}, indent=1) + "\n")
 
 
 def shipped_model_path(preset_name: str) -> Path:

@@ -214,3 +214,11 @@ def test_the_command_refuses_an_unknown_preset_in_one_line():
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "unheard-of" in done.stderr
+
+
+def test_the_command_names_a_file_that_cannot_be_written_in_one_line(tmp_path):
+    target = tmp_path / "absent" / "fitted.toml"
+    done = calibration("--generations", "0", "--out", str(target))
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert str(target) in done.stderr
