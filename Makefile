@@ -7,7 +7,9 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 BIN := .venv/bin
 RUNNER := hil_sim/campaign/native
-SOURCES := $(wildcard firmware_c/*/*.[ch] $(RUNNER)/*.[ch]) bms/firmware/build.py hil_sim/campaign/build.py setup.py
+RIVALS := bms/rivals/native
+SOURCES := $(wildcard firmware_c/*/*.[ch] $(RUNNER)/*.[ch] $(RIVALS)/*.[ch]) \
+  bms/firmware/build.py bms/rivals/build.py hil_sim/campaign/build.py setup.py
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 C_WARNINGS := -std=c99 -pedantic -Wall -Wextra -Werror -Wconversion -Wdouble-promotion -Wmissing-prototypes
 C_INCLUDES := -Ifirmware_c/include -Ifirmware_c/src -Ifirmware_c/generated
@@ -29,8 +31,8 @@ lint: .venv/tests ## Types, style and C warnings
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	for source in firmware_c/src/*.c firmware_c/generated/*.c $(RUNNER)/*.c; do \
-	  $(CC) $(C_WARNINGS) $(C_INCLUDES) -I$(RUNNER) -fsyntax-only $$source || exit 1; done
+	for source in firmware_c/src/*.c firmware_c/generated/*.c $(RUNNER)/*.c $(RIVALS)/*.c; do \
+	  $(CC) $(C_WARNINGS) $(C_INCLUDES) -I$(RUNNER) -I$(RIVALS) -fsyntax-only $$source || exit 1; done
 
 generate: .venv/runtime ## Write firmware_c/generated anew from preset, model and CAN database
 	$(BIN)/python -m codegen
@@ -41,7 +43,7 @@ models: .venv/runtime ## Train the shipped models anew (both presets) and genera
 	$(BIN)/python -m codegen
 
 clean: ## Remove everything that set-up, build and runs have made
-	rm -rf .venv build out *.egg-info bms/firmware/_firmware.* hil_sim/campaign/_runner.*
+	rm -rf .venv build out *.egg-info bms/firmware/_firmware.* bms/rivals/_rivals.* hil_sim/campaign/_runner.*
 
 .venv/runtime: pyproject.toml constraints.txt $(SOURCES)
 	tools/check_machine.sh $(PYTHON)

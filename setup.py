@@ -2,4 +2,10 @@
 
 from setuptools import setup
 
-setup(cffi_modules=["bms/firmware/build.py:ffibuilder", "hil_sim/campaign/build.py:ffibuilder"])
+setup(
+    cffi_modules=[
+        "bms/firmware/build.py:ffibuilder",
+        "bms/rivals/build.py:ffibuilder",
+        "hil_sim/campaign/build.py:ffibuilder",
+    ]
+)

@@ -46,6 +46,9 @@ def initialiser(value: Any, depth: int = 0) -> str:
         parts = [f"{inner}.{name} = {initialiser(v, depth + 1)},\n" for name, v in value.items()]
         return "{\n" + "".join(parts) + _INDENT * depth + "}"
     if isinstance(value, list | tuple):
+        if all(isinstance(item, Mapping) for item in value):
+            rows = [f"{inner}{initialiser(item, depth + 1)},\n" for item in value]
+            return "{\n" + "".join(rows) + _INDENT * depth + "}"
         numbers = [initialiser(item) for item in value]
         lines = [
             inner + ", ".join(numbers[i : i + _NUMBERS_PER_LINE]) + ",\n"

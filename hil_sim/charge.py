@@ -23,6 +23,8 @@ OFF_PERIODS = 5
 """Periods with the request off before the charge, in which the ECU starts and gets ready."""
 READY_PERIODS = 100
 """Periods after which an ECU that is not ready is given up."""
+STARTING_PERIODS = 20_000
+"""The same while it says that it is still starting: an estimator with memory has to settle."""
 SILENT_PERIODS = 5
 """Periods without an intact command that end a run; the charger has stopped well before."""
 
@@ -102,7 +104,7 @@ class Charge:
             return
         if answer.state == "standby":
             self._edge = self.steps
-        elif self.steps >= READY_PERIODS:
+        elif self.steps >= (STARTING_PERIODS if answer.state == "init" else READY_PERIODS):
             raise BusError(
                 f"the ECU is not ready after {self.steps} periods (state: {answer.state or 'none'})"
                 "; see the fault bits of its Diagnostics message"

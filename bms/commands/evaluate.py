@@ -55,14 +55,15 @@ def evaluate(
         raise InputError("evaluate: give either --preset NAME or --data CSV")
     loaded = load_model(model)
     if data is not None:
-        samples = read_measurements(data).samples()
+        samples = read_measurements(data).samples(loaded.network.lags)
     else:
         assert preset is not None
         chosen = load_preset(preset)
         check_pair(chosen, loaded)
         seed = loaded.training.settings.seed
-        samples = joined(simulated_split(chosen, "evaluation", seed).values())
-    estimate_K, in_domain = _estimate(loaded, samples, engine)
+        lags = loaded.network.lags
+        samples = joined(simulated_split(chosen, "evaluation", seed, lags=lags).values())
+    estimate_K, in_domain = _estimate(loaded, samples, engine, is_recording=data is not None)
     figures = error_figures(estimate_K, samples.core_temperature_K)
     result = {**asdict(figures), "extrapolated_samples": int(np.count_nonzero(~in_domain))}
     if as_json:
@@ -74,10 +75,13 @@ def evaluate(
         Console().print(table)
 
 
-def _estimate(model: KanModel, samples: Samples, engine: Engine) -> tuple[Array, Mask]:
+def _estimate(
+    model: KanModel, samples: Samples, engine: Engine, is_recording: bool
+) -> tuple[Array, Mask]:
     if engine is Engine.PYTHON:
         return model.network.evaluate(samples.inputs)
     # Imported here, so that the Python engine works where the firmware is not compiled.
     from bms.firmware import CompiledNetwork  # noqa: PLC0415
 
-    return CompiledNetwork(model).evaluate(samples.inputs)
+    compiled = CompiledNetwork(model)
+    return compiled.follow(samples) if is_recording else compiled.evaluate(samples.inputs)

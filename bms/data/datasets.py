@@ -8,6 +8,7 @@ import numpy as np
 
 from bms.data.profiles import KINDS, Kind, draw_profiles
 from bms.data.simulate import Samples, simulate
+from bms.kan.lags import Lags
 from bms.presets import Preset
 
 Split = Literal["training", "validation", "test", "evaluation"]
@@ -22,7 +23,7 @@ PROFILES_OF_EACH_KIND: dict[Split, int] = {
 
 
 def simulated_split(
-    preset: Preset, split: Split, seed: int, count: int | None = None
+    preset: Preset, split: Split, seed: int, count: int | None = None, lags: Lags = ()
 ) -> dict[Kind, Samples]:
     """Constant and dynamic profiles of one split, `count` of each kind (None: as shipped).
 
@@ -32,5 +33,6 @@ def simulated_split(
     profiles = PROFILES_OF_EACH_KIND[split] if count is None else count
     rng = np.random.default_rng([seed, _SPLITS.index(split)])
     return {
-        kind: simulate(preset, draw_profiles(preset, kind, profiles, rng), rng) for kind in KINDS
+        kind: simulate(preset, draw_profiles(preset, kind, profiles, rng), rng, lags)
+        for kind in KINDS
     }

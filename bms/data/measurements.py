@@ -13,6 +13,7 @@ import numpy as np
 from bms.data.profiles import Array
 from bms.data.simulate import Samples
 from bms.errors import InputError
+from bms.kan.lags import Lags, at_rest, step
 from bms.validation import read_text
 
 
@@ -27,8 +28,12 @@ class Measurements:
     coolant_temperature_K: Array
     core_temperature_K: Array
 
-    def samples(self) -> Samples:
-        """The recording as samples of one profile, inputs in the estimator's order."""
+    def samples(self, lags: Lags = ()) -> Samples:
+        """The recording as samples of one profile, inputs in the estimator's order.
+
+        Lagged inputs follow the four; the recording is taken to begin at rest, and the current of a
+        row to have flowed since the row before.
+        """
         inputs = np.stack(
             [
                 self.current_A,
@@ -38,7 +43,21 @@ class Measurements:
             ],
             axis=1,
         )
-        return Samples(inputs, self.core_temperature_K, np.zeros(len(inputs), dtype=np.int64))
+        if lags:
+            inputs = np.hstack([inputs, self._filtered(lags)])
+        return Samples(
+            inputs, self.core_temperature_K, np.zeros(len(inputs), dtype=np.int64), self.time_s
+        )
+
+    def _filtered(self, lags: Lags) -> Array:
+        """Lagged inputs (N, lags)."""
+        values = at_rest(lags, 1)
+        rows = [values[:, 0]]
+        changes_K = np.diff(self.surface_temperature_K)
+        for step_s, current_A, change_K in zip(np.diff(self.time_s), self.current_A[1:], changes_K):
+            values = step(lags, values, float(step_s), float(current_A), float(change_K))
+            rows.append(values[:, 0])
+        return np.array(rows)
 
 
 COLUMNS = tuple(field.name for field in fields(Measurements))

@@ -10,23 +10,26 @@ import numpy.typing as npt
 
 from bms.cell import CellParameters, CellState, Disturbance, integrate_step
 from bms.data.profiles import SAMPLE_PERIOD_S, Array, Profiles
+from bms.kan.lags import Lags, at_rest, step
 from bms.presets import Preset
 
 PROCESS_NOISE_K_PER_S = 5e-4
 _STEPS_PER_SAMPLE = 4
+_STEP_S = SAMPLE_PERIOD_S / _STEPS_PER_SAMPLE
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Samples of several profiles: inputs (N, 4), core temperature (N,) in K, profile number (N,).
+    """Samples of several profiles: inputs (N, n_in), core temperature, profile number and time (N,).
 
     Inputs are in the estimator's order: current in A, cooling power in W, surface and coolant
-    temperature in K.
+    temperature in K, then the lagged ones. Time rises within each profile.
     """
 
     inputs: Array
     core_temperature_K: Array
     profile: npt.NDArray[np.int64]
+    time_s: Array
 
 
 def joined(parts: Iterable[Samples]) -> Samples:
@@ -37,21 +40,26 @@ def joined(parts: Iterable[Samples]) -> Samples:
         np.concatenate([part.inputs for part in collected]),
         np.concatenate([part.core_temperature_K for part in collected]),
         np.concatenate([part.profile + end for part, end in zip(collected, ends)]),
+        np.concatenate([part.time_s for part in collected]),
     )
 
 
-def simulate(preset: Preset, profiles: Profiles, rng: np.random.Generator) -> Samples:
+def simulate(
+    preset: Preset, profiles: Profiles, rng: np.random.Generator, lags: Lags = ()
+) -> Samples:
     """Samples of every profile from its first step until the cell is full or leaves the box.
 
     The current of a sample acts until the next one; the thermal rates carry process noise of
-    5e-4 N(0, 1) K/s (paper, section "Estimating core temperature using KAN").
+    5e-4 N(0, 1) K/s (paper, section "Estimating core temperature using KAN"). Lagged inputs follow
+    the four, with filters that begin at rest.
     """
     cell, box = preset.cell, preset.operating_box
     start_K = profiles.initial_temperature_K
     state = CellState(profiles.initial_soc, start_K, start_K, start_K)
+    filtered = at_rest(lags, len(start_K))
     alive = np.ones(len(start_K), dtype=bool)
-    rows, cores, numbers = [], [], []
-    for wanted_A in profiles.wanted_current_A.T:
+    rows, cores, numbers, times_s = [], [], [], []
+    for number, wanted_A in enumerate(profiles.wanted_current_A.T):
         current_A = np.maximum(wanted_A, _derated_current_A(cell, state, profiles.core_limit_K))
         inputs = np.stack(
             [
@@ -66,20 +74,25 @@ def simulate(preset: Preset, profiles: Profiles, rng: np.random.Generator) -> Sa
         alive &= np.all((inputs >= low) & (inputs <= high), axis=1) & (state.soc <= 1.0)
         if not alive.any():
             break
-        rows.append(inputs[alive])
+        rows.append(np.hstack([inputs, filtered.T])[alive])
         cores.append(state.core_temperature_K[alive])
         numbers.append(np.flatnonzero(alive))
+        times_s.append(np.full(np.count_nonzero(alive), number * SAMPLE_PERIOD_S))
         noise = PROCESS_NOISE_K_PER_S * rng.standard_normal((3, len(start_K)))
         for _ in range(_STEPS_PER_SAMPLE):
+            before_K = state.surface_temperature_K
             state = integrate_step(
                 cell,
                 state,
                 current_A,
                 profiles.cooling_power_W,
-                SAMPLE_PERIOD_S / _STEPS_PER_SAMPLE,
+                _STEP_S,
                 Disturbance(0.0, *noise),
             )
-    return Samples(np.concatenate(rows), np.concatenate(cores), np.concatenate(numbers))
+            filtered = step(
+                lags, filtered, _STEP_S, current_A, state.surface_temperature_K - before_K
+            )
+    return Samples(*(np.concatenate(part) for part in (rows, cores, numbers, times_s)))
 
 
 def _derated_current_A(cell: CellParameters, state: CellState, core_limit_K: Array) -> Array:

@@ -15,7 +15,10 @@ from cffi import FFI
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = Path("firmware_c")
 MODULE = "bms.firmware._firmware"
-HEADERS = ("kan", "rcbf", "calibration", "can_frame", "codec", "e2e", "monitor", "soc", "bms")
+HEADERS = (
+    *("kan", "rcbf", "thermal", "calibration", "can_frame", "codec", "e2e", "monitor", "soc"),
+    *("history", "bms"),
+)
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
@@ -25,6 +28,8 @@ const bms_calibration_t *host_default_calibration(void);
 const fault_policy_t *host_fault_policies(void);
 void host_estimate_rows(const kan_model_t *model, const float *inputs, uint32_t rows,
                         float *core_temperature_K, uint8_t *in_domain);
+void host_edge_values(const kan_model_t *model, uint32_t edge, const float *arguments,
+                      uint32_t count, float *values, uint8_t *in_domain);
 """
 _HOST_SOURCE = """
 #include "bms.h"
@@ -46,6 +51,16 @@ static void host_estimate_rows(const kan_model_t *model, const float *inputs, ui
         const kan_estimate_t estimate = kan_evaluate(model, &inputs[i * model->width[0]]);
         core_temperature_K[i] = estimate.core_temperature_K;
         in_domain[i] = estimate.in_domain ? 1u : 0u;
+    }
+}
+
+static void host_edge_values(const kan_model_t *model, uint32_t edge, const float *arguments,
+                             uint32_t count, float *values, uint8_t *in_domain)
+{
+    for (uint32_t i = 0u; i < count; i++) {
+        bool inside = true;
+        values[i] = kan_edge_value(model, edge, arguments[i], &inside);
+        in_domain[i] = inside ? 1u : 0u;
     }
 }
 """

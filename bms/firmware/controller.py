@@ -14,9 +14,13 @@ from bms.barrier import sampling_margins
 from bms.decision import ACTIVE_CONSTRAINTS, ConstraintMargins, Decision
 from bms.firmware._firmware import ffi, lib
 from bms.firmware.calibration import calibration_block, load_pair
+from bms.data.simulate import Samples
 from bms.kan.model_file import KanModel
+from bms.kan.network import INPUT_NAMES
 from bms.presets import Preset
 from bms.tables import network_tables
+
+KAN_MEASURED_INPUTS = len(INPUT_NAMES)
 
 
 class Estimate(NamedTuple):
@@ -31,9 +35,9 @@ class CompiledNetwork:
 
     def __init__(self, model: KanModel) -> None:
         """Raises InputError when the network exceeds the firmware's maxima."""
-        tables = network_tables(model.network)
-        self._model = ffi.new("kan_model_t *", tables.fields(model.network))
+        self._tables, self._network = network_tables(model.network), model.network
         self._inputs = len(model.network.input_names)
+        self._model = self._sampled_every(1.0)
 
     def evaluate(
         self, inputs: npt.ArrayLike
@@ -53,6 +57,31 @@ class CompiledNetwork:
         )
         return core.astype(np.float64), in_domain.astype(np.bool_)
 
+    def follow(self, recording: Samples) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+        """As `evaluate`, for one recording that begins at rest; filters run in the firmware too.
+
+        Only the first four inputs of the samples are used.
+        """
+        core, in_domain = np.empty(len(recording.time_s)), np.empty(len(recording.time_s), np.bool_)
+        history, model = ffi.new("history_t *"), self._sampled_every(1.0)
+        measured = ffi.new("float[]", KAN_MEASURED_INPUTS)
+        steps_s = np.diff(recording.time_s, prepend=recording.time_s[0] - 1.0)
+        for row, (inputs, step_s) in enumerate(zip(recording.inputs.tolist(), steps_s.tolist())):
+            for place, lag in enumerate(self._network.lags):
+                model.lag[place].decay, model.lag[place].gain = lag.decay(step_s), lag.gain(step_s)
+            for place in range(KAN_MEASURED_INPUTS):
+                measured[place] = inputs[place]
+            # The filters begin at rest: the first row starts them and fills nothing into them.
+            lib.history_step(history, model, measured[0] if row else 0.0, measured[2], True)
+            estimate = lib.history_estimate(history, model, measured)
+            core[row], in_domain[row] = estimate.core_temperature_K, estimate.in_domain
+        return core, in_domain
+
+    def _sampled_every(self, period_s: float) -> Any:
+        """Tables in memory; a recording may be too short to settle, so nothing waits for that."""
+        fields = self._tables.fields(self._network, period_s)
+        return ffi.new("kan_model_t *", {**fields, "settling_periods": 0})
+
 
 class Firmware:
     """Estimator and controller of one preset, as the firmware computes them.
@@ -68,7 +97,8 @@ class Firmware:
         self.preset, self.model = load_pair(preset, model)
         self._calibration = calibration_block(self.preset, self.model, compiled_in=model is None)
         self._input = ffi.new("rcbf_input_t *")
-        self._estimator_inputs = ffi.new("float[4]")
+        self._estimator_inputs = ffi.new("float[]", KAN_MEASURED_INPUTS)
+        self._history = ffi.new("history_t *")
 
     def estimate(
         self,
@@ -78,11 +108,17 @@ class Firmware:
         surface_temperature_K: float,
         coolant_temperature_K: float,
     ) -> Estimate:
-        """Core temperature estimate for one set of measurements."""
+        """Core temperature estimate for one set of measurements.
+
+        A model with lagged inputs remembers: every call is one sampling period later, and nothing
+        is in the domain until its filters have settled.
+        """
         inputs = self._estimator_inputs
         inputs[0], inputs[1] = current_A, cooling_power_W
         inputs[2], inputs[3] = surface_temperature_K, coolant_temperature_K
-        estimate = lib.kan_evaluate(ffi.addressof(self._calibration.kan), inputs)
+        kan = ffi.addressof(self._calibration.kan)
+        lib.history_step(self._history, kan, inputs[0], inputs[2], True)
+        estimate = lib.history_estimate(self._history, kan, inputs)
         return Estimate(estimate.core_temperature_K, bool(estimate.in_domain))
 
     def solve(

@@ -24,9 +24,11 @@ from bms.kan.model_file import (
     SplitErrors,
     TrainingRecord,
 )
+from bms.kan.measured import train_on_recording
 from bms.kan.network import Network
+from bms.kan.scaling import Ranges
 from bms.kan.settings import TrainingSettings
-from bms.kan.training import Ranges, train_network
+from bms.kan.training import train_network
 from bms.presets import Preset
 
 Progress = Callable[[float], None]
@@ -45,15 +47,14 @@ def model_for_preset(
 ) -> KanModel:
     """Model trained on profiles simulated from the preset; `counts` are profiles of each kind."""
     splits: tuple[Split, ...] = ("training", "validation", "test")
-    data = {split: simulated_split(preset, split, settings.seed, counts[split]) for split in splits}
+    data = {
+        split: simulated_split(preset, split, settings.seed, counts[split], settings.lags)
+        for split in splits
+    }
     samples = {split: joined(kinds.values()) for split, kinds in data.items()}
-    network = train_network(
-        samples["training"],
-        samples["validation"],
-        preset.operating_box.ranges(),
-        settings,
-        progress,
-    )
+    box = preset.operating_box.ranges()
+    ranges = (*box, *_box(samples["training"].inputs[:, len(box) :]))
+    network = train_network(samples["training"], samples["validation"], ranges, settings, progress)
     errors: dict[str, SplitErrors] = {
         split: SplitErrors(
             overall=_figures(network, samples[split]),
@@ -63,7 +64,9 @@ def model_for_preset(
         for split, kinds in data.items()
     }
     rng = np.random.default_rng([settings.seed, len(splits) + 1])
-    steps = simulate(preset, draw_profiles(preset, "steps", counts["test"], rng), rng)
+    steps = simulate(
+        preset, draw_profiles(preset, "steps", counts["test"], rng), rng, settings.lags
+    )
     worst_step_K = _figures(network, steps).max_abs_error_K
     test_inputs = samples["test"].inputs
     return _model(
@@ -90,13 +93,13 @@ def model_for_measurements(path: Path, settings: TrainingSettings, progress: Pro
     bound is that of the last third; the noise of the sensors is part of it already.
     Raises InputError when the file cannot be used or is too short.
     """
-    recording = read_measurements(path).samples()
+    recording = read_measurements(path).samples(settings.lags)
     rows = len(recording.core_temperature_K)
     if rows < _FEWEST_ROWS:
         raise InputError(f"{path}: {rows} rows; training needs at least {_FEWEST_ROWS}")
     cut = round(_TRAINING_SHARE * rows)
     training, test = _rows(recording, slice(cut)), _rows(recording, slice(cut, None))
-    network = train_network(training, training, _box(training.inputs), settings, progress)
+    network = train_on_recording(training, _box(training.inputs), settings, progress)
     return _model(
         network,
         TrainingRecord(
@@ -143,7 +146,12 @@ def _figures(network: Network, samples: Samples) -> ErrorFigures:
 
 
 def _rows(samples: Samples, rows: slice) -> Samples:
-    return Samples(samples.inputs[rows], samples.core_temperature_K[rows], samples.profile[rows])
+    return Samples(
+        samples.inputs[rows],
+        samples.core_temperature_K[rows],
+        samples.profile[rows],
+        samples.time_s[rows],
+    )
 
 
 def _box(inputs: Array) -> Ranges:

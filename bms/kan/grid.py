@@ -30,7 +30,8 @@ def _on_new_grid(layer: TrainableLayer, x: Array, is_first: bool) -> TrainableLa
     wanted = splines(layer, expand(layer, x))
     knots, coefficients = [], []
     for source, column in enumerate(x):
-        grid = _blended_grid(column, intervals, is_first)
+        span = (-1.0, 1.0) if is_first else hidden_span(column, _HIDDEN_MARGIN)
+        grid = blended_grid(column, intervals, span)
         knots.append(extended_knots(grid, layer.degree))
         design = basis(np.clip(column, grid[0], grid[-1]), knots[-1], layer.degree)
         coefficients.append(np.linalg.lstsq(design.T, wanted[source].T, rcond=None)[0].T)
@@ -43,16 +44,18 @@ def _on_new_grid(layer: TrainableLayer, x: Array, is_first: bool) -> TrainableLa
     )
 
 
-def _blended_grid(column: Array, intervals: int, is_first: bool) -> Array:
-    if is_first:
-        low, high = -1.0, 1.0
-    else:
-        # A node that is constant still needs a grid of some width.
-        margin = _HIDDEN_MARGIN * max(float(np.ptp(column)), 1e-3)
-        low, high = float(column.min()) - margin, float(column.max()) + margin
-    uniform = np.linspace(low, high, intervals + 1)
+def hidden_span(column: Array, margin: float) -> tuple[float, float]:
+    """Range of a node's values (N,) and a margin, as a share of the range, on either side."""
+    # A node that is constant still needs a grid of some width.
+    beyond = margin * max(float(np.ptp(column)), 1e-3)
+    return float(column.min()) - beyond, float(column.max()) + beyond
+
+
+def blended_grid(column: Array, intervals: int, span: tuple[float, float]) -> Array:
+    """Grid over `span` (intervals + 1,) that blends a uniform one with the values' quantiles."""
+    uniform = np.linspace(*span, intervals + 1)
     quantiles = np.quantile(column, np.linspace(0.0, 1.0, intervals + 1))
-    quantiles[0], quantiles[-1] = low, high
+    quantiles[0], quantiles[-1] = span
     return _UNIFORM_SHARE * uniform + (1.0 - _UNIFORM_SHARE) * quantiles
 
 

@@ -10,6 +10,8 @@ from annotated_types import Ge
 
 from bms.errors import InputError
 from bms.kan.basis import Array, Mask, basis, silu
+from bms.kan.domain import EVERYWHERE, Domain
+from bms.kan.lags import Lags
 from bms.validation import Finite, Positive, strict
 
 INPUT_NAMES = (
@@ -51,8 +53,10 @@ Layer = tuple[tuple[Edge, ...], ...]
 class Network:
     """Layers of edges, layers[n][out][in], with the scaling of inputs and output.
 
-    Inputs become (x - center)/half_range, so that the operating box is -1..1; the output y becomes
-    output_center_K + output_half_range_K y. Source: paper, section "KAN structure".
+    Inputs become (x - center)/half_range, so that the trained box is -1..1; the output y becomes
+    output_center_K + output_half_range_K y. Source: paper, section "KAN structure". Of the inputs,
+    the last `lags` are filtered ones. Inputs beyond -1..1 or out of `domain`, which holds
+    normalised inputs, are flagged; they act as far as -reach..reach.
     Raises InputError when shapes do not fit together or knots do not rise.
     """
 
@@ -63,11 +67,19 @@ class Network:
     output_center_K: Finite
     output_half_range_K: Positive
     layers: tuple[Layer, ...]
+    lags: Lags = ()
+    domain: Domain = EVERYWHERE
+    reach: Annotated[float, Ge(1.0)] = 1.0
 
     def __post_init__(self) -> None:
         inputs = len(self.input_names)
         if not inputs == len(self.input_center) == len(self.input_half_range):
             raise InputError("input_names, input_center and input_half_range differ in length")
+        names = tuple(lag.input_name for lag in self.lags)
+        if names and self.input_names[-len(names) :] != names:
+            raise InputError(f"input_names: must end in those of the lags, {', '.join(names)}")
+        if any(len(direction) != inputs for direction in self.domain.directions):
+            raise InputError(f"domain: every direction needs {inputs} components")
         if not self.layers:
             raise InputError("layers: at least one is needed")
         for number, layer in enumerate(self.layers):
@@ -96,12 +108,12 @@ class Network:
     def evaluate(self, inputs: Array) -> tuple[Array, Mask]:
         """Core temperature in K and whether it can be trusted (bool), both (N,).
 
-        `inputs` has shape (N, n_in) in the order of input_names. Out of the trained domain
-        (an input outside the box, or a hidden value outside its grid) the value is clamped.
+        `inputs` has shape (N, n_in) in the order of input_names. Not to be trusted are inputs
+        outside the box or the domain, and hidden values outside their grid.
         """
         normalised = (inputs - np.asarray(self.input_center)) / np.asarray(self.input_half_range)
-        nodes = np.clip(normalised, -1.0, 1.0)
-        in_domain = np.all(np.abs(normalised) <= 1.0, axis=1)
+        nodes = np.clip(normalised, -self.reach, self.reach)
+        in_domain = np.all(np.abs(normalised) <= 1.0, axis=1) & self.domain.contains(normalised)
         for layer in self.layers:
             columns = []
             for row in layer:

@@ -8,7 +8,8 @@ from typing import Annotated
 from annotated_types import Ge, MinLen
 
 from bms.errors import InputError
-from bms.validation import NonNegative, strict
+from bms.kan.lags import Lag, Lags
+from bms.validation import NonNegative, Positive, strict
 
 Count = Annotated[int, Ge(1)]
 
@@ -18,7 +19,8 @@ Count = Annotated[int, Ge(1)]
 class TrainingSettings:
     """Shape of the network and hyper-parameters; the defaults are the paper's table.
 
-    `refinement_steps` L-BFGS steps without penalties follow the epochs; the paper has none.
+    `refinement_steps` L-BFGS steps without penalties follow the epochs; the paper has none. Every
+    time constant adds two lagged inputs, of the current squared and of the surface temperature.
     Raises InputError for a width that does not end in one output.
     """
 
@@ -33,7 +35,24 @@ class TrainingSettings:
     entropy_penalty: NonNegative = 0.17
     refinement_steps: Annotated[int, Ge(0)] = 80
     seed: Annotated[int, Ge(0)] = 0
+    lag_time_constants_s: tuple[Positive, ...] = ()
 
     def __post_init__(self) -> None:
         if self.width[-1] != 1:
             raise InputError("width: must end in 1, the core temperature")
+
+    @property
+    def lags(self) -> Lags:
+        """Lagged inputs in the network's order."""
+        return (
+            *(Lag("current_squared_A2", constant_s) for constant_s in self.lag_time_constants_s),
+            *(
+                Lag("surface_temperature_rise_K", constant_s)
+                for constant_s in self.lag_time_constants_s
+            ),
+        )
+
+    @property
+    def has_one_hidden_node(self) -> bool:
+        """Whether the network is an outer function of a sum, as [4, 1, 1] is."""
+        return self.width[1:] == (1, 1)

@@ -1,4 +1,4 @@
-"""Training: the paper's penalised epochs, then a refinement without penalties."""
+"""Training: the paper's penalised epochs or an additive fit, then a refinement without penalties."""
 
 from __future__ import annotations
 
@@ -7,22 +7,25 @@ from collections.abc import Callable
 import numpy as np
 
 from bms.data.simulate import Samples
-from bms.errors import InputError
+from bms.kan.additive import additive_layers
 from bms.kan.basis import Array, uniform_knots
 from bms.kan.descent import descend, gauss_newton_directions
+from bms.kan.domain import domain_of
 from bms.kan.grid import follow_data, solve_last_layer
 from bms.kan.loss import Loss, Penalty
-from bms.kan.network import INPUT_NAMES, Network
+from bms.kan.network import Network
+from bms.kan.scaling import Ranges, Scaling
 from bms.kan.settings import TrainingSettings
 from bms.kan.trainable import TrainableLayer, forward
 
-Ranges = tuple[tuple[float, float], ...]
+Progress = Callable[[float], None]
 
 _STEPS_PER_EPOCH = 20
 _EPOCHS_PER_GRID_UPDATE = 5
 _STEPS_PER_ROUND = 20
 _PROBES = 2**14
 _INITIAL_NOISE = 0.1
+_START_ROUGHNESS = 1e-9
 _NO_PENALTY = Penalty(0.0, 0.0, 0.0)
 
 
@@ -31,55 +34,42 @@ def train_network(
     validation: Samples,
     ranges: Ranges,
     settings: TrainingSettings,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: Progress = lambda share: None,
 ) -> Network:
     """Network fitted to samples whose inputs lie within `ranges`, (low, high) for each input.
 
-    Each epoch takes a few L-BFGS steps on a new batch; until the epoch of `grid_update_stop` the
-    grids follow the data. The refinement takes all samples and no penalties, which would leave a
-    bias of some hundredths of a kelvin. Of the network after the epochs and after each round of
-    the refinement, the one with the smallest validation error is kept. `progress` gets the share
-    done, 0..1. Raises InputError when the width does not fit the inputs.
+    Two starts: the paper's penalised epochs and, with one hidden node, the additive fit. Each is
+    refined on all samples without penalties, which would leave a bias of some hundredths of a
+    kelvin. Of all the networks on the way the one with the smallest validation error is kept.
+    `progress` gets the share done, 0..1. Raises InputError when the width does not fit the inputs.
     """
-    if settings.width[0] != len(ranges):
-        raise InputError(f"width: must begin with {len(ranges)}, the number of inputs")
-    low, high = np.transpose(np.asarray(ranges))
-    center, half_range = 0.5 * (low + high), 0.5 * (high - low)
-    coldest_K = float(training.core_temperature_K.min())
-    warmest_K = float(training.core_temperature_K.max())
-    output_center_K = 0.5 * (warmest_K + coldest_K)
-    # A recording at one temperature still needs a scale.
-    output_half_range_K = max(0.5 * (warmest_K - coldest_K), 1e-3)
-
-    def normalised(samples: Samples) -> tuple[Array, Array]:
-        x = np.ascontiguousarray(((samples.inputs - center) / half_range).T)
-        return x, (samples.core_temperature_K - output_center_K) / output_half_range_K
-
-    layers = _fitted_layers(normalised(training), normalised(validation), settings, progress)
-    return Network(
-        settings.degree,
-        INPUT_NAMES,
-        tuple(center.tolist()),
-        tuple(half_range.tolist()),
-        output_center_K,
-        output_half_range_K,
-        tuple(layer.frozen() for layer in layers),
-    )
-
-
-def _fitted_layers(
-    training: tuple[Array, Array],
-    validation: tuple[Array, Array],
-    settings: TrainingSettings,
-    progress: Callable[[float], None],
-) -> list[TrainableLayer]:
-    x, target = training
+    scaling = Scaling.of(training, ranges, settings)
+    x, target = scaling.normalised(training)
+    held_out = scaling.normalised(validation)
     rng = np.random.default_rng(settings.seed)
-    penalty = Penalty(settings.regularisation, settings.l1_penalty, settings.entropy_penalty)
-    rounds = -(-settings.refinement_steps // _STEPS_PER_ROUND)
-    # A round on all samples takes about as long as five epochs.
-    total = max(settings.epochs + 5 * rounds, 1)
+    starts = [_penalised_epochs(x, target, settings, rng, lambda share: progress(0.6 * share))]
+    if settings.has_one_hidden_node:
+        starts.append(additive_layers(x, target, settings, 1.0, _START_ROUGHNESS))
+    candidates = []
+    for number, start in enumerate(starts):
+        candidates += _refined(x, target, start, settings.refinement_steps, rng)
+        progress(0.6 + 0.4 * (number + 1) / len(starts))
+    best = min(candidates, key=lambda layers: mean_square(layers, *held_out))
+    return scaling.network(best, settings, 1.0, domain_of(x.T))
 
+
+def _penalised_epochs(
+    x: Array,
+    target: Array,
+    settings: TrainingSettings,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> list[TrainableLayer]:
+    """The paper's training: each epoch takes a few L-BFGS steps on a new batch.
+
+    Until the epoch of `grid_update_stop` the grids follow the data.
+    """
+    penalty = Penalty(settings.regularisation, settings.l1_penalty, settings.entropy_penalty)
     layers = follow_data(initial_layers(settings, rng), x)
     for epoch in range(settings.epochs):
         if 0 < epoch <= settings.grid_update_stop and epoch % _EPOCHS_PER_GRID_UPDATE == 0:
@@ -88,20 +78,26 @@ def _fitted_layers(
         layers = descend(
             layers, Loss(layers, x[:, batch], target[batch], penalty), _STEPS_PER_EPOCH
         )
-        progress((epoch + 1) / total)
+        progress((epoch + 1) / settings.epochs)
+    return layers
 
-    candidates = [solve_last_layer(follow_data(layers, x), x, target)]
-    for number in range(rounds):
+
+def _refined(
+    x: Array, target: Array, start: list[TrainableLayer], steps: int, rng: np.random.Generator
+) -> list[list[TrainableLayer]]:
+    """Networks after no and each further round of steps on all samples without penalties."""
+    candidates = [solve_last_layer(follow_data(start, x), x, target)]
+    for _ in range(-(-steps // _STEPS_PER_ROUND)):
         layers = candidates[-1]
         probes = x[:, rng.permutation(len(target))[:_PROBES]]
         loss = Loss(layers, x, target, _NO_PENALTY)
         layers = descend(layers, loss, _STEPS_PER_ROUND, gauss_newton_directions(layers, probes))
         candidates.append(solve_last_layer(follow_data(layers, x), x, target))
-        progress((settings.epochs + 5 * (number + 1)) / total)
-    return min(candidates, key=lambda layers: _mean_square(layers, *validation))
+    return candidates
 
 
-def _mean_square(layers: list[TrainableLayer], x: Array, target: Array) -> float:
+def mean_square(layers: list[TrainableLayer], x: Array, target: Array) -> float:
+    """Mean squared error of normalised samples x (in, N) against target (N,)."""
     return float(np.mean((forward(layers, x)[0] - target) ** 2))
 
 

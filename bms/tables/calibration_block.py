@@ -11,13 +11,14 @@ from types import MappingProxyType
 from typing import Any
 
 from bms.barrier import barrier_constants, sampling_margins
+from bms.barrier.surface_prediction import surface_prediction
 from bms.errors import InputError, ModelMismatchError
 from bms.kan.model_file import KanModel
 from bms.kan.network import INPUT_NAMES
 from bms.presets import Preset
 from bms.tables.network_tables import network_tables
 
-LAYOUT = 1
+LAYOUT = 2
 """Layout number of bms_calibration_t that this module fills (BMS_CALIBRATION_LAYOUT)."""
 MAX_OCV_POINTS = 64
 
@@ -38,6 +39,7 @@ _DEVIATIONS = {
     "voltage_deviation_V": 0.2,
     "voltage_overshoot_V": 0.05,
     "temperature_overshoot_K": 2.0,
+    "surface_deficit_K": 1.0,
 }
 
 
@@ -46,10 +48,13 @@ NO_CHANGES: Mapping[str, float] = MappingProxyType({})
 
 def check_pair(preset: Preset, model: KanModel) -> None:
     """Raise ModelMismatchError when the model was trained for another cell or box."""
-    if tuple(model.network.input_names) != INPUT_NAMES:
+    names = model.network.input_names
+    if names[: len(INPUT_NAMES)] != INPUT_NAMES or len(names) != len(INPUT_NAMES) + len(
+        model.network.lags
+    ):
         raise ModelMismatchError(
             f"model with inputs {list(model.network.input_names)}: the firmware has "
-            f"{list(INPUT_NAMES)}"
+            f"{list(INPUT_NAMES)} and filtered ones"
         )
     if model.training_hash is not None and model.training_hash != preset.training_hash:
         raise ModelMismatchError(
@@ -81,7 +86,8 @@ def calibration_fields(
         "completion_soc": preset.limits.completion_soc,
         "rcbf": _barrier_fields(preset, model.error_bound_K),
         "plausibility": _plausibility_fields(preset),
-        "kan": network_tables(model.network).fields(model.network),
+        "thermal": _thermal_fields(preset),
+        "kan": network_tables(model.network).fields(model.network, preset.timing.sampling_period_s),
     }
     for name, value in changes.items():
         section = fields["rcbf"] if name in fields["rcbf"] else fields
@@ -124,6 +130,18 @@ def _barrier_fields(preset: Preset, error_bound_K: float) -> dict[str, Any]:
         "ocv_points": len(cell.ocv.soc),
         "ocv_soc": list(cell.ocv.soc),
         "ocv_V": list(cell.ocv.voltage_V),
+    }
+
+
+def _thermal_fields(preset: Preset) -> dict[str, Any]:
+    prediction = surface_prediction(preset.cell, preset)
+    return {
+        "transition": prediction.transition.ravel().tolist(),
+        "gain_K_per_W": prediction.gain_K_per_W.tolist(),
+        "gain_coolant": prediction.gain_coolant.tolist(),
+        "ohmic_resistance_ohm": preset.cell.ohmic_resistance_ohm,
+        "entropic_coefficient_V_per_K": preset.cell.entropic_coefficient_V_per_K,
+        "error_bound_K": prediction.error_bound_K,
     }
 
 

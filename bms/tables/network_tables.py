@@ -7,6 +7,7 @@ nodes, so that the firmware needs no exponential. Cells are halved until the err
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -16,11 +17,13 @@ import numpy.typing as npt
 from numpy.polynomial import Chebyshev, Polynomial
 
 from bms.errors import InputError
+from bms.kan.lags import QUANTITIES, Lags, settling_time_s
 from bms.kan.network import Edge, Network
 
 Array = npt.NDArray[np.float64]
 
 MAX_LAYERS, MAX_WIDTH, MAX_KNOTS, MAX_COEFFICIENTS = 3, 8, 192, 512
+MAX_LAGS, MAX_DIRECTIONS = 4, 8
 """The firmware's compile-time maxima (firmware_c/include/kan.h)."""
 CELL_COEFFICIENTS = 8
 TABLE_ERROR_K = 1e-5
@@ -46,12 +49,14 @@ class NetworkTables:
     edges: tuple[EdgeTable, ...]
     error_bound_K: float
 
-    def fields(self, network: Network) -> dict[str, Any]:
-        """Content of the firmware's kan_model_t."""
+    def fields(self, network: Network, sampling_period_s: float) -> dict[str, Any]:
+        """Content of the firmware's kan_model_t for readings every `sampling_period_s`."""
         return {
             "layers": len(self.width) - 1,
             "cells": self.cells,
             "width": list(self.width),
+            **_memory_fields(network.lags, sampling_period_s),
+            **_domain_fields(network),
             "input_center": list(network.input_center),
             "input_scale": [1.0 / half for half in network.input_half_range],
             "output_center_K": network.output_center_K,
@@ -59,6 +64,37 @@ class NetworkTables:
             "knots": np.concatenate([edge.knots for edge in self.edges]).tolist(),
             "coefficients": np.concatenate([e.coefficients.ravel() for e in self.edges]).tolist(),
         }
+
+
+def _memory_fields(lags: Lags, sampling_period_s: float) -> dict[str, Any]:
+    if not lags:
+        return {}
+    return {
+        "lags": len(lags),
+        "settling_periods": math.ceil(settling_time_s(lags) / sampling_period_s),
+        "lag": [
+            {
+                "quantity": QUANTITIES.index(lag.quantity),
+                "decay": lag.decay(sampling_period_s),
+                "gain": lag.gain(sampling_period_s),
+            }
+            for lag in lags
+        ],
+    }
+
+
+def _domain_fields(network: Network) -> dict[str, Any]:
+    domain = network.domain
+    if not domain.directions:
+        return {"input_reach": network.reach}
+    return {
+        "input_reach": network.reach,
+        "directions": len(domain.directions),
+        "direction": [
+            {"component": list(direction), "low": low, "high": high}
+            for direction, low, high in zip(domain.directions, domain.low, domain.high)
+        ],
+    }
 
 
 def network_tables(network: Network) -> NetworkTables:
@@ -86,6 +122,8 @@ def _fits(network: Network, edges: int, cells: int) -> bool:
     return (
         len(network.layers) <= MAX_LAYERS
         and max(network.width) <= MAX_WIDTH
+        and len(network.lags) <= MAX_LAGS
+        and len(network.domain.directions) <= MAX_DIRECTIONS
         and edges * (cells + 1) <= MAX_KNOTS
         and edges * cells * CELL_COEFFICIENTS <= MAX_COEFFICIENTS
     )

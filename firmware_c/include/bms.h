@@ -13,10 +13,12 @@
 #include "can_frame.h"
 #include "codec.h"
 #include "e2e.h"
+#include "history.h"
 #include "kan.h"
 #include "monitor.h"
 #include "rcbf.h"
 #include "soc.h"
+#include "thermal.h"
 
 #define BMS_FIRMWARE_VERSION 1
 #define BMS_RECEIVED_MESSAGES 4
@@ -51,6 +53,10 @@ typedef struct {
     bool may_start; /* the request has been off since start-up or the last charge */
     soc_t soc;
     bool soc_known;
+    history_t history;
+    thermal_t thermal;
+    float coolant_temperature_K; /* last usable reading */
+    float surface_temperature_K; /* measured, but no colder than the heat allows */
     monitor_t monitor;
     kan_estimate_t estimate;
     rcbf_decision_t decision;

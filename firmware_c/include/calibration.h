@@ -7,9 +7,10 @@
 
 #include "kan.h"
 #include "rcbf.h"
+#include "thermal.h"
 
 /* Raised whenever the layout of bms_calibration_t or of one of its parts changes. */
-#define BMS_CALIBRATION_LAYOUT 1
+#define BMS_CALIBRATION_LAYOUT 2
 
 typedef struct {
     float low;
@@ -27,6 +28,7 @@ typedef struct {
     float voltage_deviation_V;  /* measured against open-circuit voltage and ohmic drop */
     float voltage_overshoot_V;  /* over the limit, before it is a fault */
     float temperature_overshoot_K;
+    float surface_deficit_K; /* below the coldest that the heat allows, before it is a fault */
 } plausibility_t;
 
 typedef struct {
@@ -39,6 +41,7 @@ typedef struct {
     float completion_soc;
     rcbf_constants_t rcbf;
     plausibility_t plausibility;
+    thermal_constants_t thermal;
     kan_model_t kan;
 } bms_calibration_t;
 

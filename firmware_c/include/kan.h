@@ -14,15 +14,41 @@
 #define KAN_MAX_KNOTS 192
 #define KAN_MAX_COEFFICIENTS 512
 #define KAN_CELL_COEFFICIENTS 8
+#define KAN_MEASURED_INPUTS 4
+#define KAN_MAX_LAGS 4
+#define KAN_MAX_DIRECTIONS 8
 
-/* Edges are stored layer by layer, output by output, input by input; an edge has cells + 1 knots
+/* Edges of a model are stored layer by layer, output by output, input by input; an edge has cells + 1 knots
  * and cells * KAN_CELL_COEFFICIENTS coefficients, constant term first. */
+typedef enum { KAN_CURRENT_SQUARED = 0, KAN_SURFACE_TEMPERATURE_RISE = 1 } kan_quantity_t;
+
+/* A lagged input: y <- decay y + gain times the current squared, or the surface temperature's
+ * change, of one period. */
+typedef struct {
+    uint32_t quantity;
+    float decay;
+    float gain;
+} kan_lag_t;
+
+/* Training data lie at low <= component . normalised inputs <= high. */
+typedef struct {
+    float component[8];
+    float low;
+    float high;
+} kan_direction_t;
+
 typedef struct {
     uint32_t layers;
     uint32_t cells;
     uint32_t width[4];
+    uint32_t lags; /* the last inputs */
+    uint32_t settling_periods;
+    uint32_t directions;
+    kan_lag_t lag[4];
+    kan_direction_t direction[8];
     float input_center[8];
     float input_scale[8];
+    float input_reach; /* normalised inputs act up to this; beyond 1 they are flagged */
     float output_center_K;
     float output_half_range_K;
     float knots[KAN_MAX_KNOTS];
@@ -37,8 +63,12 @@ typedef struct {
 /* True when sizes fit the maxima, all numbers are finite and all knots rise. */
 bool kan_model_is_valid(const kan_model_t *model);
 
-/* Estimate for width[0] inputs. Inputs outside the trained domain (or not finite) are clamped and
- * clear in_domain. The model must be valid. */
+/* Edge function number `edge` at x, which is clamped to its knots; beyond them (or for NaN) clears
+ * in_domain. The model must be valid. */
+float kan_edge_value(const kan_model_t *model, uint32_t edge, float x, bool *in_domain);
+
+/* Estimate for width[0] inputs. Inputs outside the trained box or the directions' slabs (or not
+ * finite) clear in_domain; beyond input_reach they are clamped. The model must be valid. */
 kan_estimate_t kan_evaluate(const kan_model_t *model, const float *inputs);
 
 #endif

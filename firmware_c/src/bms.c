@@ -45,6 +45,8 @@ void bms_init(bms_t *bms, const bms_config_t *config)
 {
     *bms = (bms_t){ .state = BMS_INIT, .estimate = { NAN, false }, .decision = NO_DECISION };
     monitor_reset(&bms->monitor);
+    history_reset(&bms->history);
+    thermal_reset(&bms->thermal);
     if ((config != NULL) && (config->calibration != NULL) &&
         calibration_is_valid(config->calibration)) {
         bms->calibration = config->calibration;
@@ -136,22 +138,57 @@ static uint32_t symptoms_of_readings(const bms_t *bms)
            bit_if(thermal && (bms->estimate.core_temperature_K > core_limit_K),
                   FAULT_CORE_OVER_TEMPERATURE) |
            bit_if(thermal && (m->surface_temperature_K > surface_limit_K),
-                  FAULT_SURFACE_OVER_TEMPERATURE);
+                  FAULT_SURFACE_OVER_TEMPERATURE) |
+           bit_if(thermal && (bms->surface_temperature_K - m->surface_temperature_K >
+                              limits->surface_deficit_K),
+                  FAULT_SURFACE_DEFICIT);
+}
+
+/* A sensor that is stuck or has come off reads colder than the heat allows; what the heat allows
+ * then stands in for it, until the monitor sees the deficit. */
+static void update_surface_temperature(bms_t *bms, float current_A, bool is_surface_usable)
+{
+    const codec_measurement_t *m = &bms->measurement;
+    const bms_calibration_t *calibration = bms->calibration;
+    bms->surface_temperature_K = m->surface_temperature_K;
+    if (bms->thermal.is_known || is_surface_usable) {
+        thermal_step(&bms->thermal, &calibration->thermal, current_A, m->surface_temperature_K,
+                     bms->coolant_temperature_K);
+        const float coldest_K =
+            thermal_coldest_surface_K(&bms->thermal, &calibration->thermal);
+        if (bms->surface_temperature_K < coldest_K) {
+            bms->surface_temperature_K = coldest_K;
+        }
+    }
 }
 
 static void update_estimates(bms_t *bms)
 {
     const codec_measurement_t *m = &bms->measurement;
     const bms_calibration_t *calibration = bms->calibration;
-    const float inputs[4] = { m->current_A, m->cooling_power_W, m->surface_temperature_K,
-                              m->coolant_temperature_K };
-    bms->estimate = kan_evaluate(&calibration->kan, inputs);
+    const plausibility_t *limits = &calibration->plausibility;
+    const bool is_current_usable = is_fresh(bms, CAN_RECEIVED_CELL_ELECTRICAL) &&
+                                   !is_outside(m->current_A, &limits->current_A);
+    const bool is_thermal_fresh = is_fresh(bms, CAN_RECEIVED_CELL_THERMAL);
+    const bool is_surface_usable =
+        is_thermal_fresh && !is_outside(m->surface_temperature_K, &limits->surface_temperature_K);
+    const bool is_coolant_usable =
+        is_thermal_fresh && !is_outside(m->coolant_temperature_K, &limits->coolant_temperature_K);
+    /* Without a usable reading the command is what has most likely flowed. */
+    const float current_A = is_current_usable ? m->current_A : bms->command_A;
+    if (is_coolant_usable) {
+        bms->coolant_temperature_K = m->coolant_temperature_K;
+    }
+    update_surface_temperature(bms, current_A, is_surface_usable && is_coolant_usable);
+    history_step(&bms->history, &calibration->kan, current_A, bms->surface_temperature_K,
+                 is_current_usable && is_surface_usable);
+    const float measured[KAN_MEASURED_INPUTS] = { m->current_A, m->cooling_power_W,
+                                                  bms->surface_temperature_K,
+                                                  m->coolant_temperature_K };
+    bms->estimate = history_estimate(&bms->history, &calibration->kan, measured);
     if (bms->soc_known) {
-        /* Without a usable reading the command is what has most likely flowed. */
-        const bool usable = is_fresh(bms, CAN_RECEIVED_CELL_ELECTRICAL) &&
-                            !is_outside(m->current_A, &calibration->plausibility.current_A);
-        soc_count(&bms->soc, usable ? m->current_A : bms->command_A,
-                  calibration->sampling_period_s, calibration->rcbf.capacity_As);
+        soc_count(&bms->soc, current_A, calibration->sampling_period_s,
+                  calibration->rcbf.capacity_As);
     }
 }
 
@@ -201,7 +238,7 @@ static void decide(bms_t *bms)
         const rcbf_input_t input = {
             .soc = bms->soc.soc,
             .core_temperature_K = (double)bms->estimate.core_temperature_K,
-            .surface_temperature_K = (double)m->surface_temperature_K,
+            .surface_temperature_K = (double)bms->surface_temperature_K,
             .coolant_temperature_K = (double)m->coolant_temperature_K,
             .cooling_power_W = m->cooling_power_W,
             .reference_current_A = wanted_current_A(bms),
@@ -221,9 +258,14 @@ static void run_period(bms_t *bms)
         if (!all_seen && (bms->periods < START_UP_PERIODS)) {
             return;
         }
-        bms->state = BMS_STANDBY;
     }
     update_estimates(bms);
+    if (bms->state == BMS_INIT) {
+        if (history_is_settling(&bms->history, &bms->calibration->kan)) {
+            return;
+        }
+        bms->state = BMS_STANDBY;
+    }
     uint32_t symptoms = symptoms_of_missing_messages(bms) | symptoms_of_readings(bms);
     follow_request(bms, symptoms);
     decide(bms);

@@ -20,7 +20,8 @@ static bool plausibility_is_valid(const plausibility_t *limits)
            range_is_valid(&limits->coolant_temperature_K) &&
            range_is_valid(&limits->cooling_power_W) && is_positive(limits->current_deviation_A) &&
            is_positive(limits->voltage_deviation_V) && is_positive(limits->voltage_overshoot_V) &&
-           is_positive(limits->temperature_overshoot_K);
+           is_positive(limits->temperature_overshoot_K) &&
+           is_positive(limits->surface_deficit_K);
 }
 
 bool calibration_is_valid(const bms_calibration_t *calibration)
@@ -32,5 +33,7 @@ bool calibration_is_valid(const bms_calibration_t *calibration)
            is_positive(calibration->completion_soc) &&
            rcbf_constants_are_valid(&calibration->rcbf) &&
            plausibility_is_valid(&calibration->plausibility) &&
-           (calibration->kan.width[0] == 4u) && kan_model_is_valid(&calibration->kan);
+           thermal_constants_are_valid(&calibration->thermal) &&
+           (calibration->kan.width[0] == KAN_MEASURED_INPUTS + calibration->kan.lags) &&
+           kan_model_is_valid(&calibration->kan);
 }

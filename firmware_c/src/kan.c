@@ -26,9 +26,33 @@ static bool sizes_fit(const kan_model_t *model)
         }
     }
     const uint32_t edges = edge_count(model);
-    return (model->width[model->layers] == 1u) &&
+    return (model->width[model->layers] == 1u) && (model->lags <= KAN_MAX_LAGS) &&
+           (model->directions <= KAN_MAX_DIRECTIONS) &&
            (edges * (model->cells + 1u) <= KAN_MAX_KNOTS) &&
            (edges * model->cells * KAN_CELL_COEFFICIENTS <= KAN_MAX_COEFFICIENTS);
+}
+
+static bool memory_is_valid(const kan_model_t *model)
+{
+    bool valid = (model->lags == 0u) || (model->width[0] == KAN_MEASURED_INPUTS + model->lags);
+    for (uint32_t i = 0u; i < model->lags; i++) {
+        const kan_lag_t *lag = &model->lag[i];
+        valid = valid && (lag->quantity <= KAN_SURFACE_TEMPERATURE_RISE) &&
+                (lag->decay >= 0.0f) && (lag->decay < 1.0f) && numeric_is_finite(lag->gain);
+    }
+    return valid;
+}
+
+static bool domain_is_valid(const kan_model_t *model)
+{
+    bool valid = (model->input_reach >= 1.0f) && numeric_is_finite(model->input_reach);
+    for (uint32_t i = 0u; i < model->directions; i++) {
+        const kan_direction_t *direction = &model->direction[i];
+        valid = valid && numeric_all_finite(direction->component, model->width[0]) &&
+                numeric_is_finite(direction->low) && numeric_is_finite(direction->high) &&
+                (direction->low < direction->high);
+    }
+    return valid;
 }
 
 bool kan_model_is_valid(const kan_model_t *model)
@@ -36,7 +60,8 @@ bool kan_model_is_valid(const kan_model_t *model)
     if (!sizes_fit(model)) {
         return false;
     }
-    bool valid = numeric_all_finite(model->input_center, model->width[0]) &&
+    bool valid = memory_is_valid(model) && domain_is_valid(model) &&
+                 numeric_all_finite(model->input_center, model->width[0]) &&
                  numeric_all_finite(model->input_scale, model->width[0]) &&
                  numeric_is_finite(model->output_center_K) &&
                  numeric_is_finite(model->output_half_range_K);
@@ -49,9 +74,11 @@ bool kan_model_is_valid(const kan_model_t *model)
                                        edges * model->cells * KAN_CELL_COEFFICIENTS);
 }
 
-static float edge_value(const float *knots, const float *coefficients, uint32_t cells, float x,
-                        bool *in_domain)
+float kan_edge_value(const kan_model_t *model, uint32_t edge, float x, bool *in_domain)
 {
+    const uint32_t cells = model->cells;
+    const float *knots = &model->knots[edge * (cells + 1u)];
+    const float *coefficients = &model->coefficients[edge * cells * KAN_CELL_COEFFICIENTS];
     const float clamped = numeric_clamp(x, knots[0], knots[cells]);
     const float beyond = x - clamped;
     if (!((beyond <= KAN_FACE_TOLERANCE) && (beyond >= -KAN_FACE_TOLERANCE))) {
@@ -71,28 +98,43 @@ static float edge_value(const float *knots, const float *coefficients, uint32_t 
     return value;
 }
 
+/* False for NaN, which compares with nothing. */
+static bool is_in_slabs(const kan_model_t *model, const float *normalised)
+{
+    bool inside = true;
+    for (uint32_t i = 0u; i < model->directions; i++) {
+        const kan_direction_t *direction = &model->direction[i];
+        float along = 0.0f;
+        for (uint32_t k = 0u; k < model->width[0]; k++) {
+            along += direction->component[k] * normalised[k];
+        }
+        inside = inside && (along >= direction->low) && (along <= direction->high);
+    }
+    return inside;
+}
+
 kan_estimate_t kan_evaluate(const kan_model_t *model, const float *inputs)
 {
     float nodes[KAN_MAX_WIDTH] = { 0.0f };
     kan_estimate_t estimate = { 0.0f, true };
     for (uint32_t i = 0u; i < model->width[0]; i++) {
-        const float scaled = (inputs[i] - model->input_center[i]) * model->input_scale[i];
-        nodes[i] = numeric_clamp(scaled, -1.0f, 1.0f);
-        const float beyond = scaled - nodes[i];
+        nodes[i] = (inputs[i] - model->input_center[i]) * model->input_scale[i];
+        const float beyond = nodes[i] - numeric_clamp(nodes[i], -1.0f, 1.0f);
         if (!((beyond <= KAN_FACE_TOLERANCE) && (beyond >= -KAN_FACE_TOLERANCE))) {
             estimate.in_domain = false;
         }
     }
-    const float *knots = model->knots;
-    const float *coefficients = model->coefficients;
+    estimate.in_domain = is_in_slabs(model, nodes) && estimate.in_domain;
+    for (uint32_t i = 0u; i < model->width[0]; i++) {
+        nodes[i] = numeric_clamp(nodes[i], -model->input_reach, model->input_reach);
+    }
+    uint32_t edge = 0u;
     for (uint32_t layer = 0u; layer < model->layers; layer++) {
         float sums[KAN_MAX_WIDTH] = { 0.0f };
         for (uint32_t to = 0u; to < model->width[layer + 1u]; to++) {
             for (uint32_t from = 0u; from < model->width[layer]; from++) {
-                sums[to] += edge_value(knots, coefficients, model->cells, nodes[from],
-                                       &estimate.in_domain);
-                knots += model->cells + 1u;
-                coefficients += model->cells * KAN_CELL_COEFFICIENTS;
+                sums[to] += kan_edge_value(model, edge, nodes[from], &estimate.in_domain);
+                edge++;
             }
         }
         for (uint32_t i = 0u; i < KAN_MAX_WIDTH; i++) {

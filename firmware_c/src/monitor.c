@@ -22,6 +22,7 @@ const fault_policy_t MONITOR_POLICY[FAULT_COUNT] = {
     [FAULT_CORRUPTED_FRAMES] = { 3u, false },
     [FAULT_DECISION_INVALID] = { 2u, true },
     [FAULT_CALIBRATION] = { 1u, true },
+    [FAULT_SURFACE_DEFICIT] = { 5u, true },
 };
 
 void monitor_reset(monitor_t *monitor)

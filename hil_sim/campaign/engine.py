@@ -18,7 +18,7 @@ from bms.tables import calibration_fields
 from codegen.can_database import load_database
 from hil_sim.campaign._runner import ffi, lib
 from hil_sim.campaign.settings import CampaignSettings
-from hil_sim.charge import OFF_PERIODS, READY_PERIODS
+from hil_sim.charge import OFF_PERIODS, READY_PERIODS, STARTING_PERIODS
 from hil_sim.sensors import Readings
 
 Array = npt.NDArray[np.float64]
@@ -62,6 +62,7 @@ class Scenario:
                 "noise_cutoff": Sensor.NOISE_CUTOFF,
                 "off_periods": OFF_PERIODS,
                 "ready_periods": READY_PERIODS,
+                "starting_periods": STARTING_PERIODS,
                 "nominal": _cell(preset.cell),
                 "sensors": [asdict(getattr(preset.sensors, name)) for name in Readings._fields],
                 "signals": _signals(),

@@ -113,7 +113,8 @@ static charge_outcome_t outcome_of(const charge_t *charge, uint32_t state)
 {
     const charge_scenario_t *scenario = charge->scenario;
     if (!charge->requested) {
-        const bool is_late = charge->periods >= scenario->ready_periods;
+        const bool is_late = charge->periods >= ((state == BMS_INIT) ? scenario->starting_periods
+                                                                     : scenario->ready_periods);
         return (is_late && (state != BMS_STANDBY)) ? CHARGE_NOT_READY : CHARGE_RUNNING;
     }
     if (state == BMS_COMPLETE) {

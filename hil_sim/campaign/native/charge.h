@@ -35,6 +35,7 @@ typedef struct {
     double noise_cutoff; /* of the standard normal numbers */
     uint32_t off_periods;   /* before the charge is requested */
     uint32_t ready_periods; /* after which an ECU that is not ready is given up */
+    uint32_t starting_periods; /* the same while it says that it is still starting */
     cell_t nominal;         /* the cell that the controllers know */
     charge_sensor_t sensors[LINK_READINGS];
     link_signals_t signals;

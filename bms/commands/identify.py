@@ -1,0 +1,131 @@
+"""`bms identify`: cell parameters from measured temperatures."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from bms.commands.options import DataOption
+from bms.data.measurements import read_measurements
+from bms.errors import InputError
+from bms.files import write_text
+from bms.presets import Preset, load_preset
+
+if TYPE_CHECKING:
+    from bms.identification import Identification
+
+_FITTED_SHARE = 2.0 / 3.0
+_DIGITS = 6
+
+
+def identify(
+    data: DataOption,
+    preset: Annotated[
+        str, typer.Option("--preset", help="Start, and values that the data do not identify.")
+    ] = "lin2014",
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Preset with the fitted cell to write (.toml).")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+) -> None:
+    """Fit a cell's thermal parameters to measured core and surface temperature (K).
+
+    The first two thirds of the recording are fitted, the last third is simulated on and compared.
+    Temperatures fix ratios only: the core's heat capacity (J/K) is the preset's and sets the scale.
+
+    Example: bms identify --data cycle.csv --preset lin2014 --out my_cell.toml
+    """
+    from bms.identification import identify as fit  # noqa: PLC0415  (SciPy's optimisers load slowly)
+    from bms.identification.preset_toml import preset_toml  # noqa: PLC0415
+
+    if data is None:
+        raise InputError("identify: give --data CSV")
+    if out is not None and out.suffix != ".toml":
+        raise InputError(f"--out {out}: a preset is a file with the ending .toml; change the name")
+    start = load_preset(preset)
+    recording = read_measurements(data)
+    cut = round(_FITTED_SHARE * len(recording.time_s))
+    try:
+        result = fit(recording, start, slice(0, cut))
+    except InputError as error:
+        raise InputError(f"{data}: {error}") from None
+    if out is not None:
+        write_text(out, preset_toml(_preset(start, result, out.stem, data.name)))
+    if as_json:
+        typer.echo(json.dumps(_content(result), indent=1))
+    else:
+        _print(result, data)
+
+
+def _preset(start: Preset, result: Identification, name: str, data: str) -> Preset:
+    fitted: dict[str, Any] = {
+        parameter: float(f"{getattr(result.cell, parameter):.{_DIGITS}g}")
+        for parameter in result.correlated
+    }
+    return dataclasses.replace(
+        start,
+        name=name,
+        description=f"Preset {start.name} with thermal parameters identified from {data}",
+        sources=(
+            f"{', '.join(fitted)}: identified from {data} by 'bms identify'",
+            *(f"preset {start.name}: {source}" for source in start.sources),
+        ),
+        cell=dataclasses.replace(start.cell, **fitted),
+    )
+
+
+def _content(result: Identification) -> dict[str, Any]:
+    return {
+        "parameters": {
+            parameter.name: {
+                key: value for key, value in dataclasses.asdict(parameter).items() if key != "name"
+            }
+            for parameter in result.parameters
+        },
+        "fitted": dataclasses.asdict(result.fitted),
+        "held_out": None if result.held_out is None else dataclasses.asdict(result.held_out),
+        "correlation": {
+            one: dict(zip(result.correlated, row))
+            for one, row in zip(result.correlated, result.correlation.tolist())
+        },
+        "starts": result.starts,
+        "starts_at_minimum": result.starts_at_minimum,
+    }
+
+
+def _print(result: Identification, data: Path) -> None:
+    console = Console()
+    table = Table()
+    for heading in ("parameter", "value", "standard error", "preset", "remark"):
+        table.add_column(heading, no_wrap=heading == "parameter")
+    for parameter in result.parameters:
+        error = parameter.standard_error
+        table.add_row(
+            parameter.name,
+            f"{parameter.value:.5g}",
+            "" if error is None else f"{error:.2g}",
+            f"{parameter.start:.5g}",
+            parameter.remark,
+        )
+    console.print(table)
+    table = Table("rows", "number", "core RMSE K", "surface RMSE K", title=escape(str(data)))
+    for name, residuals in (("fitted", result.fitted), ("held out", result.held_out)):
+        if residuals is not None:
+            table.add_row(
+                name,
+                str(residuals.rows),
+                f"{residuals.core_rmse_K:.4f}",
+                f"{residuals.surface_rmse_K:.4f}",
+            )
+    console.print(table)
+    console.print(f"{result.starts_at_minimum} of {result.starts} starts ended in this minimum")
+    if (strongest := result.strongest_correlation) is not None:
+        one, other, value = strongest
+        console.print(f"strongest correlation: {value:+.2f} between {one} and {other}")

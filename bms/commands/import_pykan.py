@@ -1,0 +1,120 @@
+"""`bms import-pykan`: a network trained with pykan as a model."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from bms.commands.options import DataOption
+from bms.errors import InputError
+from bms.kan.model_file import KanModel, save_model
+from bms.kan.network import INPUT_NAMES
+from bms.presets import DEFAULT_PRESET, Preset, load_preset
+from bms.tables import network_tables
+
+
+def import_pykan(
+    checkpoint: Annotated[
+        Path, typer.Argument(help="What saveckpt was given: PATH of PATH_config.yml, PATH_state.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Model to write (JSON).")],
+    preset: Annotated[
+        str, typer.Option("--preset", help="Its box is the default scaling, its profiles the test.")
+    ] = DEFAULT_PRESET,
+    data: DataOption = None,
+    center: Annotated[
+        str | None, typer.Option("--center", help="Middle of each input (A, W, K, K), as a,b,c,d.")
+    ] = None,
+    half_range: Annotated[
+        str | None,
+        typer.Option("--half-range", help="Half width of each input, pykan's x = 1 above middle."),
+    ] = None,
+    output_center_K: Annotated[
+        float, typer.Option("--output-center", help="Core temperature (K) at pykan's output 0.")
+    ] = 0.0,
+    output_half_range_K: Annotated[
+        float, typer.Option("--output-half-range", help="Kelvin for each 1 of pykan's output.")
+    ] = 1.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+) -> None:
+    """Import a network that pykan has trained on inputs scaled to -1..1, and test it.
+
+    The four inputs are current, cooling power, surface and coolant temperature; another number of
+    inputs is imported without test, for evaluation only. Beyond a grid pykan's splines silently
+    become 0; here the last value is kept and the estimate flagged. Edges that were fixed to a
+    symbol are refused. Without --data the errors are those on the preset's test profiles.
+
+    Example: bms import-pykan model/0.1 --out model.json --output-center 300 --output-half-range 20
+    """
+    # Imported here, so that the other commands start without SciPy's and PyTorch's seconds.
+    from bms.kan.scaling import Scaling  # noqa: PLC0415
+    from bms.pykan_import import imported_model, imported_network, read_checkpoint  # noqa: PLC0415
+
+    chosen = load_preset(preset)
+    if not output_half_range_K > 0.0:
+        raise InputError("--output-half-range: must be above 0")
+    source = read_checkpoint(checkpoint)
+    default_center, default_half = _box(chosen, len(source.layers[0].knots))
+    scaling = Scaling(
+        np.array(default_center if center is None else _numbers("--center", center)),
+        np.array(default_half if half_range is None else _numbers("--half-range", half_range)),
+        output_center_K,
+        output_half_range_K,
+    )
+    model = imported_model(source, imported_network(source, scaling), chosen, data)
+    save_model(model, out)
+    result = _result(model)
+    if as_json:
+        typer.echo(json.dumps(result, indent=1))
+    else:
+        typer.echo(f"{out}: model {model.hash[:8]}, error bound {model.error_bound_K:.4f} K")
+        table = Table("figure", "value")
+        for name, value in result.items():
+            table.add_row(name, f"{value:.4g}" if isinstance(value, float) else str(value))
+        Console().print(table)
+
+
+def _box(preset: Preset, inputs: int) -> tuple[list[float], list[float]]:
+    """Middles and half widths of the preset's box, or 0 and 1 for other inputs than the four."""
+    if inputs != len(INPUT_NAMES):
+        return [0.0] * inputs, [1.0] * inputs
+    ranges = preset.operating_box.ranges()
+    return (
+        [0.5 * (low + high) for low, high in ranges],
+        [0.5 * (high - low) for low, high in ranges],
+    )
+
+
+def _numbers(option: str, text: str) -> list[float]:
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = [math.nan]
+    if not all(math.isfinite(value) for value in values):
+        raise InputError(f"{option}: '{text}' is not a list of numbers such as -12,1,300,295")
+    return values
+
+
+def _result(model: KanModel) -> dict[str, Any]:
+    network = model.network
+    result: dict[str, Any] = {"width": list(network.width), "degree": network.degree}
+    if "test" in model.errors:
+        result |= asdict(model.errors["test"].overall)
+    result["error_bound_K"] = model.error_bound_K
+    try:
+        tables = network_tables(network)
+    except InputError as error:
+        return result | {"fits_firmware": False, "remark": str(error)}
+    return result | {
+        "fits_firmware": True,
+        "table_cells": tables.cells,
+        "table_error_K": tables.error_bound_K,
+    }

@@ -1,0 +1,13 @@
+"""Networks trained with pykan as models of this project."""
+
+from bms.pykan_import.checkpoint import Checkpoint, CheckpointLayer, read_checkpoint
+from bms.pykan_import.model import imported_model
+from bms.pykan_import.network import imported_network
+
+__all__ = [
+    "Checkpoint",
+    "CheckpointLayer",
+    "imported_model",
+    "imported_network",
+    "read_checkpoint",
+]

@@ -1,0 +1,50 @@
+"""A trained network of this project as one of the estimators."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from bms.firmware import CompiledNetwork
+from bms.kan.basis import Array
+from bms.kan.model_file import KanModel
+from bms.kan.network import Network
+from bms.rivals.estimator import FLOAT32_BYTES, Cost, Rows, Starts
+from bms.tables import network_tables
+from bms.tables.network_tables import CELL_COEFFICIENTS
+
+
+def trained_parameters(network: Network) -> int:
+    """Coefficients of all splines, and two weights for each edge."""
+    edges = [edge for layer in network.layers for row in layer for edge in row]
+    return sum(len(edge.coefficients) + 2 for edge in edges)
+
+
+class KanEstimator:
+    """The firmware's network; lagged inputs are filtered by the caller."""
+
+    given = "training data"
+
+    def __init__(self, name: str, model: KanModel, columns: tuple[int, ...]) -> None:
+        """Raises InputError when the network exceeds the firmware's maxima."""
+        self.name, self.columns = name, columns
+        self.cost = _cost(model.network)
+        self._compiled = CompiledNetwork(model)
+
+    def estimate(self, inputs: Rows, starts: Starts) -> Array:
+        """Core temperature in K, as Estimator says."""
+        return self._compiled.evaluate(inputs)[0]
+
+
+def _cost(network: Network) -> Cost:
+    tables = network_tables(network)
+    inputs, edges = tables.width[0], sum(a * b for a, b in pairwise(tables.width))
+    table_floats = edges * (tables.cells + 1 + tables.cells * CELL_COEFFICIENTS)
+    # A lag has a coefficient and a state; a step of it is one multiply-add, the square another.
+    lags = len(network.lags)
+    squares = any(lag.quantity == "current_squared_A2" for lag in network.lags)
+    # Of an edge: Horner's scheme and the middle of the cell.
+    return Cost(
+        trained_parameters(network),
+        FLOAT32_BYTES * (2 * inputs + 2 + table_floats + 2 * lags),
+        inputs + edges * CELL_COEFFICIENTS + 1 + lags + squares,
+    )

@@ -1,0 +1,51 @@
+#include "thermal.h"
+
+#include "numeric.h"
+
+bool thermal_constants_are_valid(const thermal_constants_t *constants)
+{
+    return numeric_all_finite(constants->transition, 4u) &&
+           numeric_all_finite(constants->gain_K_per_W, 2u) &&
+           numeric_all_finite(constants->gain_coolant, 2u) &&
+           numeric_is_finite(constants->ohmic_resistance_ohm) &&
+           numeric_is_finite(constants->entropic_coefficient_V_per_K) &&
+           numeric_is_finite(constants->error_bound_K) && (constants->error_bound_K >= 0.0f);
+}
+
+void thermal_reset(thermal_t *thermal)
+{
+    *thermal = (thermal_t){ .is_known = false };
+}
+
+void thermal_step(thermal_t *thermal, const thermal_constants_t *constants, float current_A,
+                  float surface_temperature_K, float coolant_temperature_K)
+{
+    if (!thermal->is_known) {
+        thermal->is_known = true;
+        thermal->start_K = surface_temperature_K;
+        return;
+    }
+    const float core_K = thermal->start_K + thermal->core_rise_K;
+    const float heat_W = (constants->ohmic_resistance_ohm * current_A -
+                          constants->entropic_coefficient_V_per_K * core_K) *
+                         current_A;
+    const float coolant_rise_K = coolant_temperature_K - thermal->start_K;
+    const float core_rise_K = thermal->core_rise_K;
+    const float surface_rise_K = thermal->surface_rise_K;
+    thermal->core_rise_K = constants->transition[0] * core_rise_K +
+                           constants->transition[1] * surface_rise_K +
+                           constants->gain_K_per_W[0] * heat_W +
+                           constants->gain_coolant[0] * coolant_rise_K;
+    thermal->surface_rise_K = constants->transition[2] * core_rise_K +
+                              constants->transition[3] * surface_rise_K +
+                              constants->gain_K_per_W[1] * heat_W +
+                              constants->gain_coolant[1] * coolant_rise_K;
+}
+
+float thermal_coldest_surface_K(const thermal_t *thermal, const thermal_constants_t *constants)
+{
+    if (!thermal->is_known) {
+        return -FLT_MAX;
+    }
+    return (thermal->start_K + thermal->surface_rise_K) - constants->error_bound_K;
+}

@@ -1,0 +1,188 @@
+"""Cell parameters from measured temperatures: recovery of known cells, and honesty about limits."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bms.cell import CellState, integrate_step
+from bms.data.measurements import Measurements, read_measurements
+from bms.errors import InputError
+from bms.identification import identify
+from bms.identification.preset_toml import preset_toml
+from bms.identification.trajectory import thermal_trajectory
+from bms.presets import load_preset, preset_names
+from bms.validation import parse, read_toml
+
+MEASURED = Path(__file__).parents[3] / "shared" / "data" / "a123_26650_hev_cycle_1.csv"
+START = load_preset("lin2014")
+TRUTH = dataclasses.replace(
+    START.cell,
+    core_resistance_K_per_W=2.6,
+    surface_resistance_K_per_W=4.1,
+    surface_heat_capacity_J_per_K=7.0,
+    ohmic_resistance_ohm=0.017,
+    entropic_coefficient_V_per_K=1.5e-4,
+)
+SUBSTEPS = 4
+
+
+def recorded(cell, rows=1200, noise_K=0.0, current_A=None, period_s=1.1):
+    """Recording of a drive cycle, simulated by Runge-Kutta steps of the cell model."""
+    rng = np.random.default_rng(5)
+    if current_A is None:
+        current_A = np.repeat(rng.uniform(-30.0, 25.0, rows // 15 + 1), 15)[:rows]
+        current_A[rows // 2 : rows // 2 + 150] = 0.0
+    rows = len(current_A)
+    state, states = CellState(0.5, 285.0, 284.0, 283.0), []
+    for current in current_A:
+        states.append(state)
+        for _ in range(SUBSTEPS):
+            state = integrate_step(cell, state, current, 0.05, period_s / SUBSTEPS)
+    _, core_K, surface_K, coolant_K = np.array(states).T
+    return Measurements(
+        time_s=period_s * np.arange(rows),
+        current_A=np.asarray(current_A),
+        cooling_power_W=np.full(rows, 0.05),
+        surface_temperature_K=surface_K + noise_K * rng.standard_normal(rows),
+        coolant_temperature_K=coolant_K,
+        core_temperature_K=core_K + noise_K * rng.standard_normal(rows),
+    )
+
+
+def estimates(result):
+    return {parameter.name: parameter for parameter in result.parameters}
+
+
+def test_trajectory_is_that_of_the_cell_model_at_the_recordings_own_times():
+    recording = recorded(TRUTH)
+
+    core_K, surface_K = thermal_trajectory(TRUTH, recording)
+
+    np.testing.assert_allclose(core_K, recording.core_temperature_K, atol=1e-4)
+    np.testing.assert_allclose(surface_K, recording.surface_temperature_K, atol=1e-4)
+
+
+def test_trajectory_stays_finite_over_gaps_of_hours():
+    recording = recorded(TRUTH, rows=150)
+    gap = dataclasses.replace(recording, time_s=recording.time_s * 1e4)
+
+    assert np.all(np.isfinite(thermal_trajectory(TRUTH, gap)))
+
+
+def test_known_cell_is_recovered_from_noise_free_temperatures():
+    result = identify(recorded(TRUTH), START)
+
+    assert result.starts_at_minimum == result.starts
+    for parameter in estimates(result).values():
+        expected = getattr(TRUTH, parameter.name)
+        assert parameter.value == pytest.approx(expected, rel=1e-3)
+        assert getattr(result.cell, parameter.name) == parameter.value
+    assert result.fitted.core_rmse_K < 1e-4
+    assert result.held_out is None
+
+
+def test_noisy_temperatures_give_the_cell_within_the_standard_errors():
+    recording = recorded(TRUTH, noise_K=0.05)
+    rows = slice(0, 1000)
+
+    result = identify(recording, START, rows)
+
+    fitted = [e for e in result.parameters if e.standard_error is not None]
+    assert len(fitted) == 5
+    for parameter in fitted:
+        error = abs(parameter.value - getattr(TRUTH, parameter.name))
+        assert error <= 4.0 * parameter.standard_error
+        assert parameter.standard_error < 0.1 * abs(parameter.value)
+    assert (result.fitted.rows, result.held_out.rows) == (1000, 200)
+    assert result.held_out.core_rmse_K == pytest.approx(0.05, rel=0.15)
+    assert result.held_out.surface_rmse_K == pytest.approx(0.05, rel=0.15)
+
+
+def test_noise_beyond_the_fitted_rows_does_not_change_the_cell():
+    recording = recorded(TRUTH)
+    spoilt = dataclasses.replace(
+        recording, core_temperature_K=recording.core_temperature_K + (np.arange(1200) >= 1000)
+    )
+
+    assert identify(spoilt, START, slice(1000)).cell == identify(recording, START, slice(1000)).cell
+    assert identify(spoilt, START, slice(1000)).held_out.core_rmse_K == pytest.approx(1.0, abs=1e-3)
+
+
+def test_temperatures_alone_do_not_fix_the_scale():
+    """With the heat capacity halved, resistances double and heats halve: the same temperatures."""
+    halved = dataclasses.replace(
+        START,
+        cell=dataclasses.replace(
+            START.cell,
+            core_heat_capacity_J_per_K=0.5 * START.cell.core_heat_capacity_J_per_K,
+        ),
+    )
+
+    result = identify(recorded(TRUTH), halved).cell
+
+    assert result.core_heat_capacity_J_per_K == halved.cell.core_heat_capacity_J_per_K
+    assert result.core_resistance_K_per_W == pytest.approx(
+        2.0 * TRUTH.core_resistance_K_per_W, rel=1e-3
+    )
+    assert result.ohmic_resistance_ohm == pytest.approx(0.5 * TRUTH.ohmic_resistance_ohm, rel=1e-3)
+
+
+def test_without_current_the_heat_sources_keep_the_presets_values_and_it_is_said():
+    cooling_down = recorded(TRUTH, current_A=np.zeros(600))
+
+    result = identify(cooling_down, START)
+
+    for name in ("ohmic_resistance_ohm", "entropic_coefficient_V_per_K"):
+        estimate = estimates(result)[name]
+        assert estimate.standard_error is None
+        assert "not identifiable" in estimate.remark
+        assert getattr(result.cell, name) == getattr(START.cell, name)
+        assert name not in result.correlated
+
+
+def test_cell_at_rest_identifies_nothing():
+    at_rest = dataclasses.replace(
+        recorded(TRUTH, current_A=np.zeros(200)),
+        **{f"{part}_temperature_K": np.full(200, 290.0) for part in ("core", "surface", "coolant")},
+    )
+
+    with pytest.raises(InputError, match="no parameter can be identified"):
+        identify(at_rest, START)
+
+
+@pytest.mark.parametrize(("rows", "enough"), [(slice(99), False), (slice(100), True)])
+def test_a_hundred_rows_are_needed(rows, enough):
+    recording = recorded(TRUTH, rows=200)
+    if enough:
+        assert identify(recording, START, rows).fitted.rows == 100
+    else:
+        with pytest.raises(InputError, match="at least 100"):
+            identify(recording, START, rows)
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_preset_written_as_toml_reads_the_same(name, tmp_path):
+    preset = dataclasses.replace(load_preset(name), description='quoted "text" \\ °C')
+    (tmp_path / "p.toml").write_text(preset_toml(preset), encoding="utf-8")
+
+    assert load_preset(tmp_path / "p.toml") == preset
+    with_gain = dataclasses.replace(
+        preset, gains=dataclasses.replace(preset.gains, alpha2_per_s=1e-17)
+    )
+    (tmp_path / "p.toml").write_text(preset_toml(with_gain), encoding="utf-8")
+    assert parse(type(preset), read_toml(tmp_path / "p.toml"), "p.toml") == with_gain
+
+
+@pytest.mark.skipif(not MEASURED.is_file(), reason="not run: no measured data in ../shared/data")
+def test_measured_drive_cycle():
+    recording = read_measurements(MEASURED)
+
+    result = identify(recording, START, slice(round(2 / 3 * len(recording.time_s))))
+
+    assert result.held_out is not None
+    assert result.fitted.core_rmse_K < 0.95
+    assert result.held_out.core_rmse_K < 0.92
+    assert result.held_out.surface_rmse_K < 0.57
+    assert 0.008 < result.cell.ohmic_resistance_ohm < 0.0241
