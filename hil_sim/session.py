@@ -14,6 +14,7 @@ import numpy as np
 from bms.baselines import BASELINES
 from bms.firmware import Ecu
 from bms.presets import Preset
+from bms.presets.schema import Sensors
 from hil_sim.bus import CanBus, open_bus, require_shared
 from hil_sim.charge import Charge, Progress
 from hil_sim.charger import Charger
@@ -52,6 +53,7 @@ class ControllerKind(str, Enum):
 
 
 EcuFactory = Callable[[Plant, "dict[str, MessageCodec]"], EcuLike]
+SensorFactory = Callable[[Sensors, np.random.Generator], SensorSuite]
 
 
 @dataclass(frozen=True)
@@ -75,10 +77,12 @@ def run_both(
     recorder: Recorder | None = None,
     progress: Progress = lambda soc: None,
     ecu_factory: EcuFactory | None = None,
+    sensor_factory: SensorFactory = SensorSuite,
 ) -> RunResult:
     """Plant and ECU in this process and thread, on two connections to one bus.
 
-    `ecu_factory` replaces the controller that the settings name. Raises InputError or BusError.
+    `ecu_factory` replaces the controller that the settings name, `sensor_factory` the sensors that
+    the preset describes. Raises InputError or BusError.
     """
     database = load_database()
     with ExitStack() as stack:
@@ -99,7 +103,7 @@ def run_both(
             turn = PacedLockStep(period_s, timeout_s, serve, WallClock())
         else:
             turn = LockStep(period_s, timeout_s, serve)
-        return _run(settings, plant, plant_bus, database, turn, recorder, progress)
+        return _run(settings, plant, plant_bus, database, turn, recorder, progress, sensor_factory)
 
 
 def run_plant(
@@ -154,6 +158,7 @@ def _run(
     turn: Turn,
     recorder: Recorder | None,
     progress: Progress,
+    sensor_factory: SensorFactory = SensorSuite,
 ) -> RunResult:
     preset = settings.preset
     _, sensor_rng = _generators(settings.seed)
@@ -161,7 +166,7 @@ def _run(
         preset=preset,
         node=PlantNode(bus, database, turn, recorder),
         plant=plant,
-        sensors=SensorSuite(preset.sensors, sensor_rng),
+        sensors=sensor_factory(preset.sensors, sensor_rng),
         charger=Charger(preset, settings.charger_delay_periods),
         max_time_s=settings.max_time_s,
         progress=progress,

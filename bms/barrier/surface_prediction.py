@@ -19,6 +19,8 @@ from bms.cell import CellParameters
 from bms.kan.basis import Array
 from bms.presets.schema import Preset
 
+_BUS = BusQuantisation()
+
 
 @dataclass(frozen=True)
 class SurfacePrediction:
@@ -35,7 +37,7 @@ class SurfacePrediction:
 
 
 def surface_prediction(
-    cell: CellParameters, preset: Preset, bus: BusQuantisation = BusQuantisation()
+    cell: CellParameters, preset: Preset, bus: BusQuantisation = _BUS
 ) -> SurfacePrediction:
     """Exact discretisation for the preset's period, inputs held, of the cell's two-mass model.
 

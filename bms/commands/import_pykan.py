@@ -63,15 +63,25 @@ def import_pykan(
         raise InputError("--output-half-range: must be above 0")
     source = read_checkpoint(checkpoint)
     default_center, default_half = _box(chosen, len(source.layers[0].knots))
+    halves = default_half if half_range is None else _numbers("--half-range", half_range)
+    if min(halves) <= 0.0:
+        raise InputError(f"--half-range: '{half_range}' must be above 0 for every input")
     scaling = Scaling(
         np.array(default_center if center is None else _numbers("--center", center)),
-        np.array(default_half if half_range is None else _numbers("--half-range", half_range)),
+        np.array(halves),
         output_center_K,
         output_half_range_K,
     )
     model = imported_model(source, imported_network(source, scaling), chosen, data)
     save_model(model, out)
     result = _result(model)
+    if source.samples is not None:
+        values = scaling.input_center + scaling.input_half_range * source.samples
+        trusted = model.network.evaluate(values)[1]
+        result |= {
+            "checkpoint_samples": len(trusted),
+            "checkpoint_samples_in_domain": int(np.count_nonzero(trusted)),
+        }
     if as_json:
         typer.echo(json.dumps(result, indent=1))
     else:

@@ -28,12 +28,12 @@ SAMPLE_PERIOD_S = 1.0
 _DURATION_S = {"constant": 3600.0, "dynamic": 1200.0, "steps": 1200.0}
 _COLDEST_START_ABOVE_BOX_K = 2.0
 _WARMEST_START_BELOW_BOX_K = 13.0
-_MAX_INITIAL_SOC = 0.2
+MAX_INITIAL_SOC = 0.2
 _SHARE_OF_RESTS = 0.2
 _SHARE_OF_STEPS = 0.25
 _HOLD_S = (30.0, 300.0)
 _RAMP_A_PER_S = (0.05, 1.0)
-_CORE_LIMIT_BELOW_BOX_K = (1.0, 25.0)
+CORE_LIMIT_BELOW_BOX_K = (1.0, 25.0)
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,7 @@ def draw_profiles(preset: Preset, kind: Kind, count: int, rng: np.random.Generat
     """
     box = preset.operating_box
     shares = _latin_hypercube(count, 5, rng)
-    low_K = box.surface_temperature_K[0] + _COLDEST_START_ABOVE_BOX_K
-    high_K = box.surface_temperature_K[1] - _WARMEST_START_BELOW_BOX_K
+    low_K, high_K = start_range_K(preset)
     steps = round(_DURATION_S[kind] / SAMPLE_PERIOD_S)
     if kind == "constant":
         current_A = np.repeat(_between(shares[:, :1], *box.current_A), steps, axis=1)
@@ -73,16 +72,22 @@ def draw_profiles(preset: Preset, kind: Kind, count: int, rng: np.random.Generat
         core_limit_K = np.full(count, np.inf)
     else:
         current_A = np.stack([_wandering_current_A(box.current_A, steps, rng) for _ in shares])
-        near_K, far_K = _CORE_LIMIT_BELOW_BOX_K
+        near_K, far_K = CORE_LIMIT_BELOW_BOX_K
         core_limit_K = box.surface_temperature_K[1] - _between(shares[:, 4], near_K, far_K)
     return Profiles(
         kind,
         current_A,
         _between(shares[:, 1], *box.cooling_power_W),
         _between(shares[:, 2], low_K, high_K),
-        _between(shares[:, 3], 0.0, _MAX_INITIAL_SOC),
+        _between(shares[:, 3], 0.0, MAX_INITIAL_SOC),
         core_limit_K,
     )
+
+
+def start_range_K(preset: Preset) -> tuple[float, float]:
+    """Temperatures from which profiles begin, so far within the box that they stay in it a while."""
+    low_K, high_K = preset.operating_box.surface_temperature_K
+    return low_K + _COLDEST_START_ABOVE_BOX_K, high_K - _WARMEST_START_BELOW_BOX_K
 
 
 def _wandering_current_A(

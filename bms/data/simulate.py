@@ -20,7 +20,7 @@ _STEP_S = SAMPLE_PERIOD_S / _STEPS_PER_SAMPLE
 
 @dataclass(frozen=True)
 class Samples:
-    """Samples of several profiles: inputs (N, n_in), core temperature, profile number and time (N,).
+    """Samples of several profiles: inputs (N, n_in), core temperature, profile number, time (N,).
 
     Inputs are in the estimator's order: current in A, cooling power in W, surface and coolant
     temperature in K, then the lagged ones. Time rises within each profile.

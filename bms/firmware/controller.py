@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from bms.barrier import sampling_margins
+from bms.data.simulate import Samples
 from bms.decision import ACTIVE_CONSTRAINTS, ConstraintMargins, Decision
 from bms.firmware._firmware import ffi, lib
 from bms.firmware.calibration import calibration_block, load_pair
-from bms.data.simulate import Samples
 from bms.kan.model_file import KanModel
 from bms.kan.network import INPUT_NAMES
 from bms.presets import Preset

@@ -17,7 +17,7 @@ class CompiledEdges:
 
     def __init__(self, network: Network) -> None:
         """Raises InputError when the network exceeds the firmware's maxima."""
-        self._model = ffi.new("kan_model_t *", network_tables(network).fields(network))
+        self._model = ffi.new("kan_model_t *", network_tables(network).fields(network, 1.0))
 
     def evaluate(
         self, edge: int, arguments: Float32, values: Float32, in_domain: npt.NDArray[np.uint8]

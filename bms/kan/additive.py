@@ -17,9 +17,10 @@ from scipy.interpolate import BSpline
 from bms.kan.basis import Array, basis, extended_knots
 from bms.kan.grid import blended_grid, hidden_span
 from bms.kan.settings import TrainingSettings
-from bms.kan.trainable import TrainableLayer, forward
+from bms.kan.trainable import TrainableLayer, activations, expand, forward
 
-_LEAST_MARGIN = 0.05
+_MARGIN = 0.05
+_PROBES = 256
 
 
 @dataclass(frozen=True)
@@ -40,14 +41,20 @@ def additive_layers(
 ) -> list[TrainableLayer]:
     """Layers of a network [n, 1, 1] for normalised inputs x (n, N) and target (N,).
 
-    The inputs' functions span -reach..reach; `roughness` weighs their squared curvature against
+    The inputs' functions span -reach..reach, and the outer one what they can add up to there; `roughness` weighs their squared curvature against
     the mean squared error.
     """
     span = (-reach, reach)
     inner = [_spline(np.clip(row, *span), span, settings) for row in x]
     first = _layer(inner, _penalised_fit(inner, target, roughness), settings)
     hidden = forward([first], x)[0]
-    outer = [_spline(hidden, hidden_span(hidden, max(_LEAST_MARGIN, reach - 1.0)), settings)]
+    low, high = hidden_span(hidden, _MARGIN)
+    if reach > 1.0:
+        everywhere = np.tile(np.linspace(*span, _PROBES), (len(x), 1))
+        values = activations(first, expand(first, everywhere))
+        low = min(low, float(values.min(axis=2).sum()))
+        high = max(high, float(values.max(axis=2).sum()))
+    outer = [_spline(hidden, (low, high), settings)]
     return [first, _layer(outer, _penalised_fit(outer, target, roughness), settings)]
 
 
@@ -55,15 +62,22 @@ def _spline(column: Array, span: tuple[float, float], settings: TrainingSettings
     degree = settings.degree
     grid = blended_grid(column, settings.grid, span)
     knots = extended_knots(grid, degree)
+    return _Spline(knots, basis(column, knots, degree), _curvature(grid, knots, degree))
+
+
+def _curvature(grid: Array, knots: Array, degree: int) -> Array:
+    identity = np.eye(len(grid) - 1 + degree)
     half_width = 0.5 * (grid[-1] - grid[0])
+    if degree == 1:
+        # All the bend is at the grid points, as jumps of the slope.
+        slopes = np.diff(identity, axis=0) / np.diff(grid)[:, None]
+        return half_width * np.diff(slopes, axis=0)
     nodes, weights = np.polynomial.legendre.leggauss(degree)
     middles, halves = 0.5 * (grid[1:] + grid[:-1]), 0.5 * np.diff(grid)
     points = (middles[:, None] + halves[:, None] * nodes).ravel()
-    # A spline of degree 1 has its bends at the knots only; there the slope stands in.
-    order = min(2, degree - 1)
-    derivative = BSpline(knots, np.eye(settings.grid + degree), degree).derivative(order)
-    scale = np.sqrt((halves[:, None] * weights).ravel() / half_width) * half_width**order
-    return _Spline(knots, basis(column, knots, degree), scale[:, None] * derivative(points))
+    second = BSpline(knots, identity, degree).derivative(2)(points)
+    scale = np.sqrt((halves[:, None] * weights).ravel() / half_width) * half_width**2
+    return np.asarray(scale[:, None] * second)
 
 
 def _penalised_fit(splines: list[_Spline], target: Array, roughness: float) -> Array:

@@ -9,14 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
-from bms.barrier.margins import BusQuantisation
+from bms.bounds.derive import (
+    FULL_EFFORT,
+    bounds_for_preset,
+    bounds_for_recording,
+    error_bound_parts_K,
+)
+from bms.bounds.record import ErrorBounds
 from bms.data.datasets import PROFILES_OF_EACH_KIND, Split, simulated_split
 from bms.data.measurements import read_measurements
-from bms.data.profiles import draw_profiles
-from bms.data.simulate import Samples, joined, simulate
+from bms.data.simulate import Samples, joined
 from bms.errors import InputError
-from bms.kan.accuracy import ARITHMETIC_K, error_figures, measurement_error_K
+from bms.kan.accuracy import error_figures
 from bms.kan.basis import Array
+from bms.kan.measured import train_on_recording
 from bms.kan.model_file import (
     FORMAT_VERSION,
     ErrorFigures,
@@ -24,12 +30,12 @@ from bms.kan.model_file import (
     SplitErrors,
     TrainingRecord,
 )
-from bms.kan.measured import train_on_recording
 from bms.kan.network import Network
 from bms.kan.scaling import Ranges
 from bms.kan.settings import TrainingSettings
 from bms.kan.training import train_network
 from bms.presets import Preset
+from bms.tables.rounding import edge_error_bounds, fits_firmware
 
 Progress = Callable[[float], None]
 
@@ -63,12 +69,14 @@ def model_for_preset(
         )
         for split, kinds in data.items()
     }
-    rng = np.random.default_rng([settings.seed, len(splits) + 1])
-    steps = simulate(
-        preset, draw_profiles(preset, "steps", counts["test"], rng), rng, settings.lags
+    bounds = bounds_for_preset(
+        network,
+        preset,
+        samples["training"],
+        samples["test"],
+        settings.seed,
+        FULL_EFFORT.scaled(counts["test"] / PROFILES_OF_EACH_KIND["test"]),
     )
-    worst_step_K = _figures(network, steps).max_abs_error_K
-    test_inputs = samples["test"].inputs
     return _model(
         network,
         TrainingRecord(
@@ -78,10 +86,8 @@ def model_for_preset(
             {split: 2 * counts[split] for split in splits},
         ),
         errors,
-        {
-            "full_steps_beyond": max(0.0, worst_step_K - errors["test"].overall.max_abs_error_K),
-            "sensors": measurement_error_K(network, test_inputs, preset.sensors, BusQuantisation()),
-        },
+        bounds,
+        samples["test"],
         preset,
     )
 
@@ -97,8 +103,7 @@ def model_for_measurements(path: Path, settings: TrainingSettings, progress: Pro
     rows = len(recording.core_temperature_K)
     if rows < _FEWEST_ROWS:
         raise InputError(f"{path}: {rows} rows; training needs at least {_FEWEST_ROWS}")
-    cut = round(_TRAINING_SHARE * rows)
-    training, test = _rows(recording, slice(cut)), _rows(recording, slice(cut, None))
+    training, test = split_by_time(recording)
     network = train_on_recording(training, _box(training.inputs), settings, progress)
     return _model(
         network,
@@ -112,23 +117,27 @@ def model_for_measurements(path: Path, settings: TrainingSettings, progress: Pro
             "training": SplitErrors(_figures(network, training)),
             "test": SplitErrors(_figures(network, test)),
         },
-        {},
+        bounds_for_recording(network, training, test, settings.seed),
+        test,
         None,
     )
+
+
+def split_by_time(recording: Samples) -> tuple[Samples, Samples]:
+    """The first two thirds of a recording, for training, and the last one, for testing."""
+    cut = round(_TRAINING_SHARE * len(recording.core_temperature_K))
+    return _rows(recording, slice(cut)), _rows(recording, slice(cut, None))
 
 
 def _model(
     network: Network,
     record: TrainingRecord,
     errors: dict[str, SplitErrors],
-    further_bounds_K: dict[str, float],
+    bounds: ErrorBounds,
+    held_out: Samples,
     preset: Preset | None,
 ) -> KanModel:
-    parts_K = {
-        "held_out_profiles": errors["test"].overall.max_abs_error_K,
-        **further_bounds_K,
-        "arithmetic": ARITHMETIC_K,
-    }
+    parts_K = error_bound_parts_K(network, bounds, held_out, preset)
     return KanModel(
         FORMAT_VERSION,
         network,
@@ -138,6 +147,8 @@ def _model(
         errors,
         math.fsum(parts_K.values()),
         parts_K,
+        bounds,
+        edge_error_bounds(network) if fits_firmware(network) else (),
     )
 
 

@@ -40,13 +40,13 @@ def gauss_newton_directions(layers: list[TrainableLayer], x: Array) -> Array:
     Inverse square root of the Gauss-Newton matrix. B-spline coefficients are badly scaled against
     each other, and without this L-BFGS needs some thousand steps more.
     """
-    jacobian = _jacobian(layers, x)
-    curvature, vectors = np.linalg.eigh(jacobian @ jacobian.T / x.shape[1])
+    slopes = jacobian(layers, x)
+    curvature, vectors = np.linalg.eigh(slopes @ slopes.T / x.shape[1])
     floor = _SMALLEST_CURVATURE * curvature[-1]
     return np.asarray(vectors / np.sqrt(np.maximum(curvature, floor)))
 
 
-def _jacobian(layers: list[TrainableLayer], x: Array) -> Array:
+def jacobian(layers: list[TrainableLayer], x: Array) -> Array:
     """Derivative of the output by every parameter, (P, N)."""
     expansions = []
     for layer in layers:

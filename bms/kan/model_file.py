@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 from annotated_types import Ge
 
+from bms.bounds.record import ErrorBounds
 from bms.errors import InputError
 from bms.files import write_text
 from bms.kan.network import Network
@@ -62,8 +63,11 @@ class TrainingRecord:
 class KanModel:
     """A network with its provenance, its errors on each split and its error bound.
 
-    `error_bound_K` (e_max) is the sum of `error_bound_parts_K`. `training_hash` is
-    Preset.training_hash at training time, None when trained on measurements.
+    `error_bound_K` (e_max) is the sum of `error_bound_parts_K`, whose "estimate" is the one of
+    `error_bounds` that is in use; None there means that they were not derived. `edge_error_bounds`
+    bound the firmware's error of every edge, in the unit of its value; empty for a network that the
+    firmware cannot hold. `training_hash` is Preset.training_hash at training time, None when
+    trained on measurements.
     """
 
     format_version: int
@@ -74,6 +78,8 @@ class KanModel:
     errors: dict[str, SplitErrors]
     error_bound_K: NonNegative
     error_bound_parts_K: dict[str, NonNegative]
+    error_bounds: ErrorBounds | None = None
+    edge_error_bounds: tuple[NonNegative, ...] = ()
 
     def __post_init__(self) -> None:
         if self.format_version != FORMAT_VERSION:
@@ -83,6 +89,10 @@ class KanModel:
             )
         if not math.isclose(self.error_bound_K, math.fsum(self.error_bound_parts_K.values())):
             raise InputError("error_bound_K: must be the sum of error_bound_parts_K")
+        if self.error_bounds is not None and not math.isclose(
+            self.error_bound_parts_K.get("estimate", math.nan), self.error_bounds.used_K
+        ):
+            raise InputError("error_bound_parts_K.estimate: must be the bound in use")
 
     @property
     def hash(self) -> str:
@@ -99,6 +109,11 @@ def load_model(path: Path) -> KanModel:
     """
     content: Any = read_json(path)
     stated = content.pop("hash", None) if isinstance(content, dict) else None
+    if isinstance(content, dict) and "error_bound_K" in content and "error_bounds" not in content:
+        raise InputError(
+            f"{path}: error_bounds: missing, the file is older than this version of bms; "
+            "train the model again with 'bms train'"
+        )
     model = parse(KanModel, content, str(path))
     if stated != model.hash:
         raise InputError(
@@ -113,9 +128,14 @@ def save_model(model: KanModel, path: Path) -> None:
     write_text(path, json.dumps({"hash": model.hash, **asdict(model)}, indent=1) + "\n")
 
 
-def shipped_model_path(preset_name: str) -> Path:
-    """Path of the model that ships for a preset."""
-    return _SHIPPED / f"{preset_name}.json"
+def shipped_model_path(preset_name: str, lagged: bool = False) -> Path:
+    """Path of the model that ships for a preset; the lagged one sees the past, too."""
+    return _SHIPPED / f"{preset_name}{'_lagged' if lagged else ''}.json"
+
+
+def shipped_models() -> list[Path]:
+    """Paths of all models that ship, by name."""
+    return sorted(_SHIPPED.glob("*.json"))
 
 
 def load_shipped_model(preset_name: str) -> KanModel:

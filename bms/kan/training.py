@@ -1,4 +1,4 @@
-"""Training: the paper's penalised epochs or an additive fit, then a refinement without penalties."""
+"""Training: the paper's penalised epochs or an additive fit, then steps without penalties."""
 
 from __future__ import annotations
 

@@ -66,8 +66,8 @@ def read_checkpoint(path: Path) -> Checkpoint:
         raise InputError(f"{where}: holds no state of a network; write it with pykan's saveckpt")
     if config.get("base_fun_name") != _BASE_FUNCTION:
         raise InputError(
-            f"{prefix}_config.yml: base_fun_name: {config.get('base_fun_name')!r} on all edges is not "
-            f"supported; train with base_fun='{_BASE_FUNCTION}'"
+            f"{prefix}_config.yml: base_fun_name: {config.get('base_fun_name')!r} on every edge "
+            f"is not supported; train with base_fun='{_BASE_FUNCTION}'"
         )
     widths, degree = _widths(config, prefix), _degree(config, prefix)
     try:

@@ -1,4 +1,4 @@
-"""An imported network as a model with errors and error bound of its own."""
+"""An imported network as a model with errors and error bounds of its own."""
 
 from __future__ import annotations
 
@@ -6,14 +6,12 @@ import hashlib
 import math
 from pathlib import Path
 
-import numpy as np
-
-from bms.barrier.margins import BusQuantisation
+from bms.bounds.derive import bounds_for_preset, bounds_for_recording, error_bound_parts_K
+from bms.bounds.record import ErrorBounds
 from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
-from bms.data.profiles import draw_profiles
-from bms.data.simulate import Samples, joined, simulate
-from bms.kan.accuracy import ARITHMETIC_K, error_figures, measurement_error_K
+from bms.data.simulate import Samples, joined
+from bms.kan.accuracy import error_figures
 from bms.kan.model_file import (
     FORMAT_VERSION,
     ErrorFigures,
@@ -25,13 +23,12 @@ from bms.kan.network import INPUT_NAMES, Network
 from bms.kan.settings import TrainingSettings
 from bms.presets import Preset
 from bms.pykan_import.checkpoint import Checkpoint
+from bms.tables.rounding import edge_error_bounds, fits_firmware
 
 UNKNOWN_ERROR_K = 1000.0
 """Bound of a network that is no estimator of the four inputs: too wide for any current."""
 
 _SEED = 0
-_STEP_PROFILES = 60
-_STEPS_STREAM = 4
 
 
 def imported_model(
@@ -39,61 +36,70 @@ def imported_model(
 ) -> KanModel:
     """Model of an imported network, with its errors on the preset's test profiles or on a CSV file.
 
-    The error bound is made up as for networks that are trained here. A network of other inputs than
+    The error bound is derived as for networks that are trained here. A network of other inputs than
     the four gets no errors, and a bound that lets no current through.
     """
-    errors: dict[str, SplitErrors] = {}
-    parts_K = {"unknown": UNKNOWN_ERROR_K}
-    source, profiles, paired = "not evaluated", 0, False
-    if network.input_names == INPUT_NAMES and data is not None:
-        figures = _figures(network, read_measurements(data).samples())
-        errors, parts_K = {"test": SplitErrors(figures)}, _parts_K(figures, {})
+    if network.input_names != INPUT_NAMES:
+        return _model(checkpoint, network, "not evaluated", {}, {"unknown": UNKNOWN_ERROR_K})
+    if data is not None:
+        recording = read_measurements(data).samples()
         digest = hashlib.sha256(data.read_bytes()).hexdigest()
-        source, profiles = f"tested on {data.name}, SHA-256 {digest}", 1
-    elif network.input_names == INPUT_NAMES:
-        kinds = simulated_split(preset, "test", _SEED)
-        samples = joined(kinds.values())
-        figures = _figures(network, samples)
-        errors["test"] = SplitErrors(
-            figures, _figures(network, kinds["constant"]), _figures(network, kinds["dynamic"])
+        bounds = bounds_for_recording(network, recording, recording, _SEED)
+        return _model(
+            checkpoint,
+            network,
+            f"tested on {data.name}, SHA-256 {digest}",
+            {"test": SplitErrors(_figures(network, recording))},
+            error_bound_parts_K(network, bounds, recording, None),
+            bounds,
         )
-        rng = np.random.default_rng([_SEED, _STEPS_STREAM])
-        steps = simulate(preset, draw_profiles(preset, "steps", _STEP_PROFILES, rng), rng)
-        worst_step_K = _figures(network, steps).max_abs_error_K
-        parts_K = _parts_K(
-            figures,
-            {
-                "full_steps_beyond": max(0.0, worst_step_K - figures.max_abs_error_K),
-                "sensors": measurement_error_K(
-                    network, samples.inputs, preset.sensors, BusQuantisation()
-                ),
-            },
-        )
-        source, paired = f"tested on preset {preset.name}", True
-        profiles = 1 + int(samples.profile.max())
+    kinds = simulated_split(preset, "test", _SEED)
+    test = joined(kinds.values())
+    training = joined(simulated_split(preset, "training", _SEED).values())
+    bounds = bounds_for_preset(network, preset, training, test, _SEED)
+    return _model(
+        checkpoint,
+        network,
+        f"tested on preset {preset.name}",
+        {
+            "test": SplitErrors(
+                _figures(network, test),
+                _figures(network, kinds["constant"]),
+                _figures(network, kinds["dynamic"]),
+            )
+        },
+        error_bound_parts_K(network, bounds, test, preset),
+        bounds,
+        preset,
+    )
+
+
+def _model(
+    checkpoint: Checkpoint,
+    network: Network,
+    tested: str,
+    errors: dict[str, SplitErrors],
+    parts_K: dict[str, float],
+    bounds: ErrorBounds | None = None,
+    preset: Preset | None = None,
+) -> KanModel:
     return KanModel(
         FORMAT_VERSION,
         network,
-        preset.name if paired else None,
-        preset.training_hash if paired else None,
+        None if preset is None else preset.name,
+        None if preset is None else preset.training_hash,
         TrainingRecord(
             _settings(checkpoint, network),
-            f"imported from pykan checkpoint {checkpoint.name}, {source}",
+            f"imported from pykan checkpoint {checkpoint.name}, {tested}",
             checkpoint.state_sha256,
-            {"test": profiles},
+            {},
         ),
         errors,
         math.fsum(parts_K.values()),
         parts_K,
+        bounds,
+        edge_error_bounds(network) if fits_firmware(network) else (),
     )
-
-
-def _parts_K(figures: ErrorFigures, further_K: dict[str, float]) -> dict[str, float]:
-    return {
-        "held_out_profiles": figures.max_abs_error_K,
-        **further_K,
-        "arithmetic": ARITHMETIC_K,
-    }
 
 
 def _figures(network: Network, samples: Samples) -> ErrorFigures:

@@ -14,6 +14,7 @@ from bms.kan.basis import Array
 from bms.kan.network import INPUT_NAMES, Edge, Layer, Network
 from bms.kan.scaling import Scaling
 from bms.pykan_import.checkpoint import Checkpoint, CheckpointLayer
+from bms.tables.rounding import fits_firmware
 
 _WIDEST_GRID = 1.1
 _FLOAT32_ROUNDING = 1e-6
@@ -23,9 +24,9 @@ def imported_network(checkpoint: Checkpoint, scaling: Scaling) -> Network:
     """Network with the values of pykan's wherever its inputs and nodes stay within their grids.
 
     Beyond a grid pykan's spline falls to 0; ours keeps the last value and flags the estimate. Where
-    the samples that pykan saw last go beyond a grid, the grid is widened by pykan's own extension.
-    Raises InputError for inputs that were not scaled to -1..1, a wrong number of scales, and more
-    than one output.
+    the samples that pykan saw last go beyond a grid, the grid is widened by pykan's own extension,
+    as far as the firmware has room for that. Raises InputError for inputs that were not scaled to
+    -1..1, a wrong number of scales, and more than one output.
     """
     first = checkpoint.layers[0]
     inputs, outputs = len(first.knots), len(checkpoint.layers[-1].node_scale)
@@ -38,13 +39,23 @@ def imported_network(checkpoint: Checkpoint, scaling: Scaling) -> Network:
         if len(values) != inputs:
             raise InputError(f"--{name}: {len(values)} values for {inputs} inputs; give {inputs}")
     _require_scaled(checkpoint)
+    for most in range(checkpoint.degree, 0, -1):
+        network = _network(checkpoint, scaling, most)
+        if fits_firmware(network):
+            return network
+    return _network(checkpoint, scaling, 0)
+
+
+def _network(checkpoint: Checkpoint, scaling: Scaling, most_intervals: int) -> Network:
     layers: list[Layer] = []
-    nodes = checkpoint.samples
-    if nodes is not None:
-        nodes = np.clip(nodes, -1.0, 1.0)
+    nodes = None if checkpoint.samples is None else np.clip(checkpoint.samples, -1.0, 1.0)
     for layer in checkpoint.layers:
-        layers.append(_layer(_widened(layer, checkpoint.degree, nodes), checkpoint.degree))
-        nodes = None if nodes is None else _following(layers[-1], nodes, checkpoint.degree)
+        if nodes is None:
+            layers.append(_layer(layer))
+        else:
+            layers.append(_layer(_widened(layer, checkpoint.degree, nodes, most_intervals)))
+            nodes = _following(layers[-1], nodes, checkpoint.degree)
+    inputs = len(checkpoint.layers[0].knots)
     return Network(
         checkpoint.degree,
         INPUT_NAMES
@@ -66,23 +77,23 @@ def _require_scaled(checkpoint: Checkpoint) -> None:
         if max(-low, high) > _WIDEST_GRID:
             raise InputError(
                 f"{checkpoint.name}: layer 0, edges from input {source}: grid "
-                f"{low:.4g}..{high:.4g} goes beyond -1..1; scale the inputs to -1..1, train and save again"
+                f"{low:.4g}..{high:.4g} goes beyond -1..1; scale the inputs and train again"
             )
 
 
-def _widened(layer: CheckpointLayer, degree: int, nodes: Array | None) -> CheckpointLayer:
-    """The same functions on grids that reach as far as the nodes (N, in) do, at most k intervals.
+def _widened(layer: CheckpointLayer, degree: int, nodes: Array, most: int) -> CheckpointLayer:
+    """The same functions on grids that reach as far as the nodes (N, in) do.
 
-    Splines of zero weight are added around the others, as many as intervals.
+    On either side at most `most` of the k intervals of pykan's extension are added, and as many
+    splines of zero weight beyond them.
     """
-    if nodes is None:
-        return layer
     below = above = 0
     for knots, column in zip(layer.knots, nodes.T):
         rounding = _FLOAT32_ROUNDING * float(np.ptp(knots))
         low, high = column.min() + rounding, column.max() - rounding
         below = max(below, int(np.sum(knots[1 : degree + 1] > low)))
         above = max(above, int(np.sum(knots[-degree - 1 : -1] < high)))
+    below, above = min(below, most), min(above, most)
     step = np.diff(layer.knots).mean(axis=1, keepdims=True)
     return CheckpointLayer(
         np.hstack(
@@ -100,7 +111,7 @@ def _widened(layer: CheckpointLayer, degree: int, nodes: Array | None) -> Checkp
     )
 
 
-def _layer(layer: CheckpointLayer, degree: int) -> Layer:
+def _layer(layer: CheckpointLayer) -> Layer:
     return tuple(
         tuple(_edge(layer, source, target) for source in range(len(layer.knots)))
         for target in range(len(layer.node_scale))

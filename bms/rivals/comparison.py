@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Literal, NamedTuple
 
 from bms.kan.accuracy import error_figures
 from bms.kan.basis import Array
 from bms.kan.model_file import ErrorFigures, KanModel
+from bms.rivals.effort import FULL, Effort
 from bms.rivals.estimator import BASE_COLUMNS, Cost, Estimator, Sequences
 from bms.rivals.filters import ExtendedKalman, FullKalman, SteadyKalman
-from bms.rivals.floor import static_floor
+from bms.rivals.floor import FLOOR, static_floor
 from bms.rivals.kan import KanEstimator, trained_parameters
 from bms.rivals.lagged import columns_of
 from bms.rivals.linear import LinearEstimator
 from bms.rivals.perceptron import PerceptronEstimator, hidden_nodes
-from bms.rivals.problem import ALL, Problem
+from bms.rivals.problem import Problem
 from bms.rivals.timing import Clock, time_per_estimate_ns
 
 Role = Literal["kan", "filter", "perceptron", "linear", "floor"]
@@ -40,8 +40,9 @@ class NamedModel(NamedTuple):
 class Row:
     """One estimator: what it was given, errors by scope, cost and time per estimate.
 
-    `errors` is empty, and `remark` says why, when it was not run. The floor has neither cost nor
-    time: it is no estimator in C. `read_rmse_K` is over all samples as the sensors show them.
+    `errors` is empty, and `remark` says why, when it was not run; `counted` is the scope that
+    figures are compared on. The floor has neither cost nor time: it is no estimator in C.
+    `read_rmse_K` is over the same samples as the sensors show them.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Row:
     is_static: bool
     given: str
     errors: dict[str, ErrorFigures]
+    counted: str
     read_rmse_K: float | None
     cost: Cost | None
     time_per_estimate_ns: float | None
@@ -56,14 +58,15 @@ class Row:
 
     @property
     def rmse_K(self) -> float:
-        """RMSE over all samples."""
-        return self.errors[ALL].rmse_K
+        """RMSE over the samples that count."""
+        return self.errors[self.counted].rmse_K
 
 
 @dataclass(frozen=True)
 class Trace:
     """Error of every estimator over one profile in K, at times in s."""
 
+    title: str
     time_s: Array
     error_K: dict[str, Array]
 
@@ -78,73 +81,83 @@ class Comparison:
 
 
 def compare(
-    problem: Problem, models: Sequence[NamedModel], seed: int, clock_ns: Clock
+    problem: Problem,
+    models: Sequence[NamedModel],
+    seed: int,
+    clock_ns: Clock,
+    effort: Effort = FULL,
 ) -> Comparison:
     """Every estimator fitted to the problem's data and run on its test, in float32 C.
 
     `seed` is that of the fits; all but the times is deterministic.
     """
-    test, read = problem.test, problem.read
-    begin, end = test.starts[problem.trace_profile : problem.trace_profile + 2]
+    begin, end = problem.test.starts[problem.trace_profile : problem.trace_profile + 2]
     rows: list[Row] = []
     trace_error_K: dict[str, Array] = {}
-    for role, name, make in _estimators(problem, models, seed):
-        try:
-            estimator = make()
-        except ImportError:
-            rows.append(Row(name, role, True, "", {}, None, None, None, NO_SCIKIT_LEARN))
-            continue
-        estimate_K = _run(estimator, test)
-        trace_error_K[estimator.name] = (estimate_K - test.core_temperature_K)[begin:end]
-        rows.append(
-            Row(
-                estimator.name,
-                role,
-                role != "filter" and estimator.columns == BASE_COLUMNS,
-                estimator.given,
-                {
-                    scope: error_figures(estimate_K[mask], test.core_temperature_K[mask])
-                    for scope, mask in problem.scopes.items()
-                },
-                None
-                if read is None
-                else error_figures(_run(estimator, read), read.core_temperature_K).rmse_K,
-                estimator.cost,
-                None if estimator.cost is None else time_per_estimate_ns(estimator, test, clock_ns),
-            )
-        )
-    return Comparison(problem.title, tuple(rows), Trace(test.time_s[begin:end], trace_error_K))
+
+    def add(role: Role, estimator: Estimator) -> None:
+        estimate_K = _run(estimator, problem.test)
+        error_K = estimate_K - problem.test.core_temperature_K
+        trace_error_K[estimator.name] = error_K[begin:end]
+        rows.append(_row(problem, role, estimator, estimate_K, clock_ns))
+
+    told = (problem.cell, problem.noise, problem.period_s)
+    for name, model in models:
+        add("kan", KanEstimator(name, model, columns_of(model.network, problem.lags)))
+    add("filter", SteadyKalman(*told, problem.cell_origin))
+    add("filter", FullKalman(*told, problem.cell_origin))
+    ignorant = f"{problem.cell_origin}, not R0"
+    add("filter", ExtendedKalman(*told, ignorant, problem.resistance_start))
+    if problem.tuned is not None:
+        name = "Kalman (steady gain, tuned)"
+        given = "a cell and noise tuned to the core temperature of the training data"
+        add("filter", SteadyKalman(*problem.tuned, problem.period_s, given, name))
+    static = [model.network for _, model in models if not model.network.lags]
+    nodes = hidden_nodes(trained_parameters(static[0]) if static else PAPER_PARAMETERS)
+    perceptron = PerceptronEstimator(
+        problem.before_validation, problem.validation, nodes, effort, seed
+    )
+    add("perceptron", perceptron)
+    add("linear", LinearEstimator("least squares", problem.training, BASE_COLUMNS, ()))
+    if problem.lags:
+        every = range(problem.training.inputs.shape[1])
+        name = "least squares (lagged inputs)"
+        add("linear", LinearEstimator(name, problem.training, every, problem.lags))
+    try:
+        add("floor", static_floor(perceptron, problem, effort, seed))
+    except ModuleNotFoundError:
+        rows.append(_floor_not_run(problem, NO_SCIKIT_LEARN))
+    trace = Trace(problem.trace_title, problem.test.time_s[begin:end], trace_error_K)
+    return Comparison(problem.title, tuple(rows), trace)
+
+
+def _row(
+    problem: Problem, role: Role, estimator: Estimator, estimate_K: Array, clock_ns: Clock
+) -> Row:
+    test, read, counted = problem.test, problem.read, problem.scopes[problem.counted]
+    return Row(
+        name=estimator.name,
+        role=role,
+        is_static=role != "filter" and estimator.columns == BASE_COLUMNS,
+        given=estimator.given,
+        errors={
+            scope: error_figures(estimate_K[mask], test.core_temperature_K[mask])
+            for scope, mask in problem.scopes.items()
+        },
+        counted=problem.counted,
+        read_rmse_K=None
+        if read is None
+        else error_figures(_run(estimator, read)[counted], read.core_temperature_K[counted]).rmse_K,
+        cost=estimator.cost,
+        time_per_estimate_ns=None
+        if estimator.cost is None
+        else time_per_estimate_ns(estimator, test, clock_ns),
+    )
+
+
+def _floor_not_run(problem: Problem, reason: str) -> Row:
+    return Row(FLOOR, "floor", True, "", {}, problem.counted, None, None, None, reason)
 
 
 def _run(estimator: Estimator, data: Sequences) -> Array:
     return estimator.estimate(data.of_columns(estimator.columns), data.starts)
-
-
-def _estimators(
-    problem: Problem, models: Sequence[NamedModel], seed: int
-) -> Iterator[tuple[Role, str, Callable[[], Estimator]]]:
-    """Role, name to show when it cannot be made, and what makes it (ImportError if it cannot)."""
-    training, validation = problem.training, problem.validation
-    told = (problem.cell, problem.noise, problem.period_s)
-    for name, model in models:
-        columns = columns_of(model.network, problem.lags)
-        yield "kan", name, partial(KanEstimator, name, model, columns)
-    yield "filter", SteadyKalman.name, lambda: SteadyKalman(*told, problem.cell_origin)
-    yield "filter", FullKalman.name, lambda: FullKalman(*told, problem.cell_origin)
-    yield (
-        "filter",
-        "extended Kalman filter",
-        lambda: ExtendedKalman(*told, f"{problem.cell_origin}, not R0", problem.resistance_start),
-    )
-    static = [model.network for _, model in models if not model.network.lags]
-    nodes = hidden_nodes(trained_parameters(static[0]) if static else PAPER_PARAMETERS)
-    yield "perceptron", "MLP", lambda: PerceptronEstimator(training, validation, nodes, seed)
-    yield "linear", "", lambda: LinearEstimator("linear least squares", training, BASE_COLUMNS)
-    if problem.lags:
-        every = range(training.inputs.shape[1])
-        yield (
-            "linear",
-            "",
-            lambda: LinearEstimator("linear least squares, lagged inputs", training, every),
-        )
-    yield "floor", "floor of static maps", lambda: static_floor(training, validation, seed)

@@ -24,7 +24,6 @@ _HEAT_AND_MODEL = 2 + 1 + 6
 class SteadyKalman:
     """Linear filter with the gain of the steady state."""
 
-    name = "Kalman filter, steady gain"
     columns = BASE_COLUMNS
     cost = Cost(
         _CELL_PARAMETERS + 3,
@@ -33,10 +32,15 @@ class SteadyKalman:
     )
 
     def __init__(
-        self, cell: CellParameters, noise: FilterNoise, period_s: float, given: str
+        self,
+        cell: CellParameters,
+        noise: FilterNoise,
+        period_s: float,
+        given: str,
+        name: str = "Kalman (steady gain)",
     ) -> None:
         discrete = DiscreteCell.of(cell, period_s)
-        self.given = given
+        self.name, self.given = name, given
         self._filter = ffi.new(
             "steady_kalman_t *",
             {"cell": _cell_fields(cell, discrete), "gain": discrete.steady_gain(noise).tolist()},
@@ -50,7 +54,7 @@ class SteadyKalman:
 class FullKalman:
     """Linear filter that computes its covariance with every sample."""
 
-    name = "Kalman filter, full covariance"
+    name = "Kalman (full covariance)"
     columns = BASE_COLUMNS
     # F P 8, F P F' 6, gain 2, correction of P 3, correction of the state 2
     cost = Cost(
@@ -97,7 +101,7 @@ class ExtendedKalman:
         start_factor: float,
     ) -> None:
         """`start_factor` is the assumed resistance at the start over the cell's."""
-        self.name = f"extended Kalman filter, R0 from {100.0 * start_factor:.0f} %"
+        self.name = f"extended Kalman (R0 from {100.0 * start_factor:.0f} %)"
         self.given = given
         resistance_ohm = start_factor * cell.ohmic_resistance_ohm
         assumed = dataclasses.replace(cell, ohmic_resistance_ohm=resistance_ohm)
@@ -120,7 +124,13 @@ class ExtendedKalman:
 
 
 def _start(noise: FilterNoise) -> Array:
-    return np.diag([noise.start_K**2, noise.reading_K**2])
+    """Both temperatures start at the same reading; the core may be off beyond that."""
+    return np.array(
+        [
+            [noise.reading_K**2 + noise.start_K**2, noise.reading_K**2],
+            [noise.reading_K**2, noise.reading_K**2],
+        ]
+    )
 
 
 def _cell_fields(cell: CellParameters, discrete: DiscreteCell) -> dict[str, Any]:

@@ -1,42 +1,40 @@
 """The floor: what a large static map of the four inputs reaches, whatever it would cost.
 
 An estimator that looks at one sample only cannot be much better than that on the same data. The
-candidates are a linear map alone, and what it leaves fitted by a perceptron of 2305 parameters
-(after more and more iterations) or by boosted trees; the best on validation data counts. They run
-in double precision, not in C.
+candidates are the perceptron of the table, a linear map, and a linear map with what it leaves
+fitted by boosted trees or by a perceptron of 2305 parameters (after more and more iterations). They
+run in double precision, not in C.
 """
 
 from __future__ import annotations
 
 import copy
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from bms.data.simulate import Samples
 from bms.kan.basis import Array
+from bms.rivals.effort import Effort
 from bms.rivals.estimator import BASE_COLUMNS, Rows, Starts
-from bms.rivals.scaling import Scaling
+from bms.rivals.perceptron import PerceptronEstimator
+from bms.rivals.problem import Problem
 
+FLOOR = "floor"
 HIDDEN_NODES = (32, 32, 32)
-ITERATIONS = (50, 100, 150, 300, 600)
 _ROWS = 2**15
-_TREES, _LEAVES, _RATE = 600, 63, 0.1
+_LEAVES, _RATE = 63, 0.1
 
 
 @dataclass(frozen=True)
 class StaticFloor:
-    """The best candidate: a linear map of the scaled inputs and a regressor on what it leaves."""
+    """The best candidate; `evaluate` gives the core temperature in K for inputs (N, 4 or more)."""
 
     name: str
-    scaling: Scaling
-    linear: Array
-    unit: float
-    regressor: Any
-    given = "training data"
+    evaluate: Callable[[Array], Array]
+    given: str
     columns = BASE_COLUMNS
     cost = None
 
@@ -44,41 +42,39 @@ class StaticFloor:
         """Core temperature in K, as Estimator says."""
         return self.evaluate(inputs.astype(np.float64))
 
-    def evaluate(self, inputs: Array) -> Array:
-        """Core temperature in K (N,) for inputs (N, 4 or more)."""
-        scaled = self.scaling.of_inputs(inputs)
-        linear = _terms(scaled) @ self.linear
-        return self.scaling.temperature_K(linear + self.unit * self.regressor.predict(scaled))
-
 
 def static_floor(
-    training: Samples,
-    validation: Samples,
-    seed: int,
-    iterations: tuple[int, ...] = ITERATIONS,
+    perceptron: PerceptronEstimator, problem: Problem, effort: Effort, seed: int
 ) -> StaticFloor:
-    """Best large static map on validation data; ImportError without scikit-learn.
-
-    The perceptron is judged after each of the `iterations`, which add up.
-    """
-    scaling = Scaling.of(training)
+    """The candidate that is best on `floor_choice`; ModuleNotFoundError without scikit-learn."""
+    scaling, training, choice = perceptron.scaling, problem.training, problem.floor_choice
+    given = f"training data, chosen by {problem.floor_chosen_by}"
     inputs, wanted = scaling.of_inputs(training.inputs), scaling.output(training)
-    linear: Array = np.linalg.lstsq(_terms(inputs), wanted, rcond=None)[0]
+    linear = np.linalg.lstsq(_terms(inputs), wanted, rcond=None)[0]
     left = wanted - _terms(inputs) @ linear
     unit = float(left.std()) or 1.0
-    candidates = [
-        StaticFloor(f"floor of static maps: {description}", scaling, linear, unit, regressor)
-        for description, regressor in _regressors(inputs, left / unit, seed, iterations)
+
+    def with_linear_map(regressor: Any) -> Callable[[Array], Array]:
+        def evaluate(unscaled: Array) -> Array:
+            scaled = scaling.of_inputs(unscaled)
+            return scaling.temperature_K(_terms(scaled) @ linear + unit * regressor.predict(scaled))
+
+        return evaluate
+
+    candidates = [StaticFloor(f"{FLOOR}: {perceptron.name}", perceptron.evaluate, given)]
+    candidates += [
+        StaticFloor(f"{FLOOR}: {description}", with_linear_map(regressor), given)
+        for description, regressor in _regressors(inputs, left / unit, effort, seed)
     ]
-    truth_K = validation.core_temperature_K
+    truth_K = choice.core_temperature_K
     return min(
         candidates,
-        key=lambda one: float(np.mean((one.evaluate(validation.inputs) - truth_K) ** 2)),
+        key=lambda one: float(np.mean((one.evaluate(choice.inputs) - truth_K) ** 2)),
     )
 
 
 def _regressors(
-    inputs: Array, wanted: Array, seed: int, iterations: tuple[int, ...]
+    inputs: Array, wanted: Array, effort: Effort, seed: int
 ) -> Iterator[tuple[str, Any]]:
     # An optional extra of the package.
     from sklearn.dummy import DummyRegressor  # noqa: PLC0415
@@ -88,13 +84,13 @@ def _regressors(
     yield "linear map", DummyRegressor(strategy="constant", constant=0.0).fit(inputs, wanted)
     trees = HistGradientBoostingRegressor(
         learning_rate=_RATE,
-        max_iter=_TREES,
+        max_iter=effort.floor_trees,
         max_leaf_nodes=_LEAVES,
         early_stopping=False,
         random_state=seed,
     )
-    yield f"{_TREES} boosted trees", trees.fit(inputs, wanted)
-    perceptron = MLPRegressor(
+    yield f"{effort.floor_trees} boosted trees", trees.fit(inputs, wanted)
+    large = MLPRegressor(
         hidden_layer_sizes=HIDDEN_NODES,
         activation="tanh",
         solver="lbfgs",
@@ -104,14 +100,14 @@ def _regressors(
         random_state=seed,
     )
     rows = np.random.default_rng(seed).permutation(len(inputs))[:_ROWS]
-    for count in iterations:
-        perceptron.set_params(max_iter=count, max_fun=10 * count)
+    for count in effort.floor_iterations:
+        large.set_params(max_iter=count, max_fun=10 * count)
         with warnings.catch_warnings():
             # The limit of iterations is meant: the validation error decides.
             warnings.simplefilter("ignore")
-            perceptron.fit(inputs[rows], wanted[rows])
-        weights = sum(part.size for part in (*perceptron.coefs_, *perceptron.intercepts_))
-        yield f"perceptron of {weights} parameters", copy.deepcopy(perceptron)
+            large.fit(inputs[rows], wanted[rows])
+        weights = sum(part.size for part in (*large.coefs_, *large.intercepts_))
+        yield f"MLP, {weights} parameters", copy.deepcopy(large)
 
 
 def _terms(inputs: Array) -> Array:

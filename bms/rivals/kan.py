@@ -9,6 +9,7 @@ from bms.kan.basis import Array
 from bms.kan.model_file import KanModel
 from bms.kan.network import Network
 from bms.rivals.estimator import FLOAT32_BYTES, Cost, Rows, Starts
+from bms.rivals.lagged import lag_cost
 from bms.tables import network_tables
 from bms.tables.network_tables import CELL_COEFFICIENTS
 
@@ -36,15 +37,15 @@ class KanEstimator:
 
 
 def _cost(network: Network) -> Cost:
+    """Of the estimate with its domain check, which the firmware cannot do without."""
     tables = network_tables(network)
     inputs, edges = tables.width[0], sum(a * b for a, b in pairwise(tables.width))
     table_floats = edges * (tables.cells + 1 + tables.cells * CELL_COEFFICIENTS)
-    # A lag has a coefficient and a state; a step of it is one multiply-add, the square another.
-    lags = len(network.lags)
-    squares = any(lag.quantity == "current_squared_A2" for lag in network.lags)
+    directions = len(network.domain.directions)
+    lags = lag_cost(network.lags)
     # Of an edge: Horner's scheme and the middle of the cell.
     return Cost(
         trained_parameters(network),
-        FLOAT32_BYTES * (2 * inputs + 2 + table_floats + 2 * lags),
-        inputs + edges * CELL_COEFFICIENTS + 1 + lags + squares,
+        FLOAT32_BYTES * (2 * inputs + 3 + table_floats + directions * (inputs + 2) + lags.floats),
+        inputs + directions * inputs + edges * CELL_COEFFICIENTS + 1 + lags.multiply_adds,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,21 @@ from bms.kan.basis import Array
 from bms.kan.lags import Lags, at_rest, step
 from bms.kan.network import INPUT_NAMES, Network
 from bms.rivals.estimator import BASE_COLUMNS
+
+
+class LagCost(NamedTuple):
+    """Constants and state of the filters as float32 numbers, and multiply-adds of a step."""
+
+    floats: int
+    multiply_adds: int
+
+
+def lag_cost(lags: Lags) -> LagCost:
+    """A lag has a decay, a gain and its value; the last surface temperature is kept as well."""
+    if not lags:
+        return LagCost(0, 0)
+    squares = any(lag.quantity == "current_squared_A2" for lag in lags)
+    return LagCost(3 * len(lags) + 1, 2 * len(lags) + squares)
 
 
 def all_lags(networks: Iterable[Network]) -> Lags:

@@ -8,8 +8,10 @@ import numpy as np
 
 from bms.data.simulate import Samples
 from bms.kan.basis import Array
+from bms.kan.lags import Lags
 from bms.rivals._rivals import ffi, lib
 from bms.rivals.estimator import FLOAT32_BYTES, Cost, Rows, Starts
+from bms.rivals.lagged import lag_cost
 from bms.rivals.native_array import filled, float_array, pointer
 
 
@@ -18,7 +20,8 @@ class LinearEstimator:
 
     given = "training data"
 
-    def __init__(self, name: str, training: Samples, columns: Sequence[int]) -> None:
+    def __init__(self, name: str, training: Samples, columns: Sequence[int], lags: Lags) -> None:
+        """`lags` are the filters behind the columns after the first four."""
         self.name, self.columns = name, tuple(columns)
         inputs = training.inputs[:, list(self.columns)]
         center = inputs.mean(axis=0)
@@ -26,7 +29,12 @@ class LinearEstimator:
         # The smallest weights where a channel does not vary, such as no cooling.
         solution = np.linalg.lstsq(terms, training.core_temperature_K, rcond=None)[0]
         count = len(self.columns)
-        self.cost = Cost(count + 1, FLOAT32_BYTES * (2 * count + 1), count)
+        filters = lag_cost(lags)
+        self.cost = Cost(
+            count + 1,
+            FLOAT32_BYTES * (2 * count + 1 + filters.floats),
+            count + filters.multiply_adds,
+        )
         self._tables = (float_array(center), float_array(solution[:-1]))
         self._linear = ffi.new(
             "linear_t *",

@@ -10,13 +10,12 @@ from scipy.optimize import least_squares
 from bms.data.simulate import Samples
 from bms.kan.basis import Array
 from bms.rivals._rivals import ffi, lib
+from bms.rivals.effort import Effort
 from bms.rivals.estimator import BASE_COLUMNS, FLOAT32_BYTES, Cost, Rows, Starts
 from bms.rivals.native_array import filled, float_array, pointer
 from bms.rivals.scaling import Scaling
 
 _INPUTS = len(BASE_COLUMNS)
-_STARTS = 5
-_STEPS, _LAST_STEPS = 150, 1000
 _ROWS = 2**13
 _TOLERANCE = 1e-12
 
@@ -62,16 +61,19 @@ class Perceptron:
 class PerceptronEstimator:
     """The four inputs through one hidden layer of tanh nodes.
 
-    Levenberg-Marquardt on random rows from several starts; the best on validation data goes on.
+    Levenberg-Marquardt on random rows from several starts; of the weights on the way those that are
+    best on validation data are kept.
     """
 
     given = "training data"
     columns = BASE_COLUMNS
 
-    def __init__(self, training: Samples, validation: Samples, nodes: int, seed: int) -> None:
+    def __init__(
+        self, training: Samples, validation: Samples, nodes: int, effort: Effort, seed: int
+    ) -> None:
         self.name = f"MLP [{_INPUTS},{nodes},1]"
         self.scaling = Scaling.of(training)
-        weights = _trained(self.scaling, training, validation, nodes, seed)
+        weights = _trained(self.scaling, training, validation, nodes, effort, seed)
         self.perceptron = Perceptron.of(weights, nodes)
         width = [_INPUTS, nodes, 1]
         self.cost = Cost(
@@ -95,6 +97,10 @@ class PerceptronEstimator:
             },
         )
 
+    def evaluate(self, inputs: Array) -> Array:
+        """Core temperature in K (N,) in double precision, for inputs (N, 4 or more)."""
+        return self.scaling.temperature_K(self.perceptron.values(self.scaling.of_inputs(inputs)))
+
     def estimate(self, inputs: Rows, starts: Starts) -> Array:
         """Core temperature in K, as Estimator says."""
         return filled(
@@ -104,7 +110,12 @@ class PerceptronEstimator:
 
 
 def _trained(
-    scaling: Scaling, training: Samples, validation: Samples, nodes: int, seed: int
+    scaling: Scaling,
+    training: Samples,
+    validation: Samples,
+    nodes: int,
+    effort: Effort,
+    seed: int,
 ) -> Array:
     """All weights in the order of Perceptron.of, which is that of the C code."""
     rng = np.random.default_rng(seed)
@@ -129,6 +140,10 @@ def _trained(
         return float(np.mean((Perceptron.of(weights, nodes).values(known_x) - known) ** 2))
 
     count = nodes * (_INPUTS + 2) + 1
-    starts = [descended(0.5 * rng.standard_normal(count), _STEPS) for _ in range(_STARTS)]
-    best = min(starts, key=mean_square)
-    return min(best, descended(best, _LAST_STEPS), key=mean_square)
+    candidates = []
+    for _ in range(effort.perceptron_starts):
+        weights = 0.5 * rng.standard_normal(count)
+        for steps in effort.perceptron_steps:
+            weights = descended(weights, steps)
+            candidates.append(weights)
+    return min(candidates, key=mean_square)

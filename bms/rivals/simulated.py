@@ -10,11 +10,10 @@ from bms.data.simulate import joined
 from bms.kan.lags import Lags
 from bms.presets import Preset
 from bms.rivals.estimator import Sequences
-from bms.rivals.problem import ALL, Problem
+from bms.rivals.problem import Problem
 from bms.rivals.readings import as_read
 from bms.rivals.thermal import FilterNoise, reading_std
 
-_START_K = 0.1
 _RESISTANCE_START = 1.2
 _RESISTANCE_START_STD = 0.2
 _RESISTANCE_DRIFT_PER_SQRT_S = 1e-4
@@ -35,13 +34,18 @@ def simulated_problem(preset: Preset, seed: int, lags: Lags, count: int | None =
     test = Sequences.of(samples)
     constant_rows = len(kinds["constant"].core_temperature_K)
     constant = np.arange(len(test.inputs)) < constant_rows
+    first_dynamic = int(np.searchsorted(test.starts, constant_rows))
     bounds = preset.uncertainty
     return Problem(
         title=f"preset {preset.name}, whole profiles that no training has seen",
         training=training,
+        before_validation=training,
         validation=validation,
+        floor_choice=validation,
+        floor_chosen_by="validation data",
         test=test,
-        scopes={"constant": constant, "dynamic": ~constant, ALL: np.ones_like(constant)},
+        scopes={"constant": constant, "dynamic": ~constant, "all": np.ones_like(constant)},
+        counted="all",
         read=Sequences.of(as_read(preset.sensors, samples, lags, rng)),
         lags=lags,
         cell=preset.cell,
@@ -50,11 +54,13 @@ def simulated_problem(preset: Preset, seed: int, lags: Lags, count: int | None =
             core_K_per_s=bounds.core_K_per_s,
             surface_K_per_s=bounds.surface_K_per_s,
             reading_K=reading_std(preset.sensors.surface_temperature_K),
-            start_K=_START_K,
+            start_K=0.0,
             resistance_start=_RESISTANCE_START_STD,
             resistance_drift_per_sqrt_s=_RESISTANCE_DRIFT_PER_SQRT_S,
         ),
+        tuned=None,
         period_s=SAMPLE_PERIOD_S,
         resistance_start=_RESISTANCE_START,
-        trace_profile=int(np.searchsorted(test.starts, constant_rows)),
+        trace_profile=first_dynamic + int(np.argmax(np.diff(test.starts[first_dynamic:]))),
+        trace_title="the longest dynamic profile",
     )

@@ -17,7 +17,8 @@ from bms.presets.schema import Sensor
 class FilterNoise:
     """Standard deviations: of the rates (constant over a period), of a reading, of the start.
 
-    The ohmic resistance, relative to the one in the model, matters to the extended filter only.
+    `start_K` is the distance of the core from thermal rest. The ohmic
+    resistance, relative to the one in the model, matters to the extended filter only.
     """
 
     core_K_per_s: float

@@ -10,7 +10,7 @@ from bms.rivals.estimator import Estimator, Sequences
 Clock = Callable[[], int]
 """Nanoseconds since any moment; it must not run backwards."""
 
-REPEATS = 15
+REPEATS = 101
 _ROWS = 2**14
 
 

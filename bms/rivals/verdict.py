@@ -5,88 +5,93 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from bms.rivals.comparison import Comparison, Row
+from bms.rivals.estimator import Cost
+from bms.rivals.floor import FLOOR
 
-_AT_THE_FLOOR = 1.1
+AT_THE_FLOOR = 1.1
+"""A network within this factor of the best other map's RMSE is said to be at the floor."""
 
 
 def verdict(comparison: Comparison) -> list[str]:
     """Sentences on accuracy, cost, and on every network beside its rivals and the floor."""
-    ran = [row for row in comparison.rows if row.errors]
-    in_c = [row for row in ran if row.cost is not None]
-    kans = [row for row in in_c if row.role == "kan"]
-    best = min(in_c, key=lambda row: row.rmse_K)
-    sentences = [
-        f"Smallest RMSE: {best.name} with {best.rmse_K:.4f} K, given {best.given}"
-        + _runner_up(best, in_c),
-        f"{_cheapest(in_c)}",
-    ]
-    read = [row for row in in_c if row.read_rmse_K is not None]
+    rivals = [row for row in comparison.rows if row.cost is not None]
+    networks = [row for row in rivals if row.role == "kan"]
+    sentences = [_most_accurate(rivals), _cheapest(rivals)]
+    read = {row.name: row.read_rmse_K for row in rivals if row.read_rmse_K is not None}
     if read:
-        steady = min(read, key=_read)
+        name, rmse_K = min(read.items(), key=lambda item: item[1])
         sentences.append(
-            f"With the sensors' noise and resolution: {steady.name} with {_read(steady):.4f} K."
+            f"With noise and resolution of the sensors the smallest RMSE is that of {name}, "
+            f"{rmse_K:.4f} K."
         )
-    sentences += [_about(kan, in_c) for kan in kans]
-    floor = next((row for row in ran if row.role == "floor"), None)
-    if floor is not None:
-        sentences += [_beside_floor(kan, floor) for kan in kans if kan.is_static]
+    sentences += [_beside_rivals(network, rivals) for network in networks]
+    others = [row for row in comparison.rows if row.errors and row.is_static and row.role != "kan"]
+    floor = min(others, key=_rmse_K)
+    sentences += [_beside_floor(network, floor) for network in networks if network.is_static]
     return sentences
 
 
-def _read(row: Row) -> float:
-    assert row.read_rmse_K is not None
-    return row.read_rmse_K
-
-
-def _runner_up(best: Row, rows: Sequence[Row]) -> str:
-    others = [row for row in rows if row.given != best.given]
+def _most_accurate(rivals: Sequence[Row]) -> str:
+    best = min(rivals, key=_rmse_K)
+    sentence = f"Smallest RMSE: {best.name}, {best.rmse_K:.4f} K; it is given {best.given}."
+    is_filter = best.role == "filter"
+    others = [row for row in rivals if (row.role == "filter") != is_filter]
     if not others:
-        return "."
-    other = min(others, key=lambda row: row.rmse_K)
+        return sentence
+    other = min(others, key=_rmse_K)
+    kind = "the fitted maps, which are given training data only," if is_filter else "the filters"
     return (
-        f"; the best of those given something else ({other.given}) is {other.name} with "
-        f"{other.rmse_K:.4f} K, {other.rmse_K / best.rmse_K:.1f} times as much."
+        f"{sentence} Of {kind} the best is {other.name}, {other.rmse_K:.4f} K, "
+        f"{other.rmse_K / best.rmse_K:.1f} times as much."
     )
 
 
-def _cheapest(rows: Sequence[Row]) -> str:
-    fewest = min(rows, key=lambda row: (_multiply_adds(row), _bytes(row)))
+def _cheapest(rivals: Sequence[Row]) -> str:
+    row = min(rivals, key=lambda one: (_cost(one).multiply_adds, _cost(one).bytes))
     return (
-        f"Cheapest: {fewest.name} with {_multiply_adds(fewest)} multiply-adds and "
-        f"{_bytes(fewest)} bytes, at {fewest.rmse_K:.4f} K."
+        f"Cheapest: {row.name}, {_cost(row).multiply_adds} multiply-adds and {_cost(row).bytes} "
+        f"bytes; its RMSE is {row.rmse_K:.4f} K."
     )
 
 
-def _about(kan: Row, rows: Sequence[Row]) -> str:
-    measures: tuple[Callable[[Row], float], ...] = (lambda r: r.rmse_K, _multiply_adds, _bytes)
+def _beside_rivals(network: Row, rivals: Sequence[Row]) -> str:
+    measures: tuple[Callable[[Row], float], ...] = (
+        _shown_rmse_K,
+        lambda row: _cost(row).multiply_adds,
+        lambda row: _cost(row).bytes,
+    )
     better = [
         row.name
-        for row in rows
-        if row is not kan
-        and all(measure(row) <= measure(kan) for measure in measures)
-        and any(measure(row) < measure(kan) for measure in measures)
+        for row in rivals
+        if all(measure(row) <= measure(network) for measure in measures)
+        and any(measure(row) < measure(network) for measure in measures)
     ]
-    place = 1 + sum(row.rmse_K < kan.rmse_K for row in rows)
-    sentence = f"{kan.name}: place {place} of {len(rows)} by RMSE ({kan.rmse_K:.4f} K)"
+    place = 1 + sum(_shown_rmse_K(row) < _shown_rmse_K(network) for row in rivals)
+    sentence = f"{network.name}: place {place} of {len(rivals)} by RMSE, {network.rmse_K:.4f} K"
     if not better:
-        return f"{sentence}; nothing is both as accurate and as cheap."
-    return f"{sentence}; no less accurate and no dearer: {', '.join(better)}."
+        return f"{sentence}; nothing else is as accurate at no higher cost."
+    return f"{sentence}; as accurate or better at no higher cost: {', '.join(better)}."
 
 
-def _beside_floor(kan: Row, floor: Row) -> str:
-    ratio = kan.rmse_K / floor.rmse_K
-    place = "at the floor" if ratio <= _AT_THE_FLOOR else "above the floor"
+def _beside_floor(network: Row, floor: Row) -> str:
+    ratio = network.rmse_K / floor.rmse_K
+    place = "at the floor" if ratio <= AT_THE_FLOOR else "above the floor"
     return (
-        f"{kan.name} is {place}: {kan.rmse_K:.4f} K are {ratio:.2f} times the {floor.rmse_K:.4f} K "
-        f"of {floor.name.removeprefix('floor of static maps: ')}."
+        f"{network.name} is {place} of static maps: {network.rmse_K:.4f} K is {ratio:.2f} times "
+        f"the {floor.rmse_K:.4f} K of the best other map of the same inputs, "
+        f"{floor.name.removeprefix(f'{FLOOR}: ')}."
     )
 
 
-def _multiply_adds(row: Row) -> int:
-    assert row.cost is not None
-    return row.cost.multiply_adds
+def _rmse_K(row: Row) -> float:
+    return row.rmse_K
 
 
-def _bytes(row: Row) -> int:
+def _shown_rmse_K(row: Row) -> float:
+    """As the table shows it: what is equal there is as accurate."""
+    return round(row.rmse_K, 4)
+
+
+def _cost(row: Row) -> Cost:
     assert row.cost is not None
-    return row.cost.bytes
+    return row.cost

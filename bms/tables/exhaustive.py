@@ -7,8 +7,10 @@ the grid, beyond it, signed zeros, denormals, infinities and NaNs of every paylo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import cache, reduce
+from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
@@ -19,9 +21,8 @@ from bms.kan.network import Edge, Network
 from bms.tables.network_tables import network_tables
 
 PATTERNS = 2**32
-DEFAULT_STRIDE = 8191
-"""Odd, so that all bits of the argument vary."""
 _BLOCK = 2**16
+_PART = 2**27
 _NEIGHBOURS = 64
 _SIGN = 0x8000_0000
 _FACE_TOLERANCE = float(np.float32(1e-6))
@@ -29,6 +30,7 @@ _FACE_TOLERANCE = float(np.float32(1e-6))
 _ROUND_OFF_BITS = 57.0
 
 Patterns = npt.NDArray[np.uint32]
+Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
@@ -36,35 +38,40 @@ class EdgeCheck:
     """Result for one edge: worst |C - double| in the unit of its value, and where; domain flags."""
 
     edge: int
-    patterns: int
+    arguments: int
     worst_error: float
-    worst_at: float
+    worst_argument: float
     wrong_flags: int
-    wrong_flag_at: float | None
+    wrong_flag_argument: float | None
 
     def joined(self, other: EdgeCheck) -> EdgeCheck:
         """Result over the arguments of both."""
         worse = self if self.worst_error >= other.worst_error else other
-        flagged = self if self.wrong_flag_at is not None else other
+        flagged = self if self.wrong_flags else other
         return EdgeCheck(
             self.edge,
-            self.patterns + other.patterns,
+            self.arguments + other.arguments,
             worse.worst_error,
-            worse.worst_at,
+            worse.worst_argument,
             self.wrong_flags + other.wrong_flags,
-            flagged.wrong_flag_at,
+            flagged.wrong_flag_argument,
         )
 
 
 class EdgeSweep:
     """One edge of a network in C, beside the same edge in double precision."""
 
-    def __init__(self, network: Network, number: int) -> None:
-        """Raises InputError when the network exceeds the firmware's maxima."""
+    def __init__(
+        self, network: Network, number: int, compiled: CompiledEdges | None = None
+    ) -> None:
+        """`compiled` are the edges to check, none: those of the network itself.
+
+        Raises InputError when the network exceeds the firmware's maxima.
+        """
         self._number = number
         self._degree = network.degree
         self._edge: Edge = edges_of(network)[number]
-        self._compiled = CompiledEdges(network)
+        self._compiled = CompiledEdges(network) if compiled is None else compiled
         self._knots = np.asarray(self._edge.knots[network.degree : -network.degree])
         self._end_values = self._edge.evaluate(self._knots[[0, -1]], self._degree)[0]
         self._table_knots = network_tables(network).edges[number].knots
@@ -140,6 +147,29 @@ class EdgeSweep:
         beyond_low = self._table_knots[0] - x <= _FACE_TOLERANCE
         beyond_high = x - self._table_knots[-1] <= _FACE_TOLERANCE
         return np.asarray(beyond_low & beyond_high)
+
+
+def check_network(
+    network: Network, stride: int, processes: int, progress: Progress = lambda share: None
+) -> list[EdgeCheck]:
+    """Check of every edge: of all arguments (stride 1), or of each stride-th and special ones.
+
+    An odd stride lets all bits of the argument vary. `progress` gets the share that a part of the
+    work has had of the whole. Raises InputError when the network exceeds the firmware's maxima.
+    """
+    numbers = range(len(edges_of(network)))
+    if stride > 1:
+        return [EdgeSweep(network, number).check_some(stride) for number in numbers]
+    firsts = range(0, PATTERNS, _PART)
+    with ProcessPoolExecutor(processes) as pool:
+        parts = [[pool.submit(_check_part, network, n, first) for first in firsts] for n in numbers]
+        for _ in as_completed(chain.from_iterable(parts)):
+            progress(1.0 / (len(numbers) * len(firsts)))
+        return [_joined(part.result() for part in edge) for edge in parts]
+
+
+def _check_part(network: Network, number: int, first: int) -> EdgeCheck:
+    return EdgeSweep(network, number).check_all(first, first + _PART)
 
 
 def edges_of(network: Network) -> list[Edge]:

@@ -29,7 +29,9 @@ def ignore(share):
 def samples_of(network, count=3000, seed=5):
     low, high = np.transpose(BOX)
     inputs = np.random.default_rng(seed).uniform(low, high, (count, 4))
-    return Samples(inputs, network.evaluate(inputs)[0], np.zeros(count, dtype=np.int64))
+    return Samples(
+        inputs, network.evaluate(inputs)[0], np.zeros(count, dtype=np.int64), np.arange(count) * 1.0
+    )
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +79,9 @@ def test_errors_in_the_model_are_those_of_its_network_on_the_splits(model):
 def test_any_shape_learns_an_additive_function(width, grid, degree):
     inputs = samples_of(random_network()).inputs
     truth_K = 300.0 + 0.01 * inputs[:, 0] ** 2 + inputs[:, 1] + 0.4 * (inputs[:, 2] - 300.0)
-    data = Samples(inputs, truth_K, np.zeros(len(inputs), dtype=np.int64))
+    data = Samples(
+        inputs, truth_K, np.zeros(len(inputs), dtype=np.int64), np.arange(len(inputs)) * 1.0
+    )
     settings = TrainingSettings(
         width=width, grid=grid, degree=degree, epochs=15, refinement_steps=100
     )
@@ -94,11 +98,15 @@ def test_any_shape_learns_an_additive_function(width, grid, degree):
 
 
 def test_without_refinement_the_penalties_hold_the_edges_small():
-    data = samples_of(random_network((4, 1, 1)))
+    data = samples_of(random_network((4, 2, 1)))
 
     def size(regularisation):
         settings = TrainingSettings(
-            epochs=10, refinement_steps=0, regularisation=regularisation, l1_penalty=1.0
+            width=(4, 2, 1),
+            epochs=10,
+            refinement_steps=0,
+            regularisation=regularisation,
+            l1_penalty=1.0,
         )
         network = train_network(data, data, BOX, settings)
         hidden = [edge.evaluate(np.linspace(-1, 1, 50), 3)[0] for edge in network.layers[0][0]]

@@ -57,12 +57,13 @@ CASES = [
     Case("reference not available", 9, 1, {"ReferenceCurrent": NOT_AVAILABLE["ReferenceCurrent"]}),
     Case("reference discharges", 9, 1, {"ReferenceCurrent": 1.0}),
     Case("start not available", 9, 1, {"PlugInStateOfCharge": 1.3107}),
-    Case("cell colder than trained", 10, 1, {"SurfaceTemperature": 260.0}),
+    Case("coolant colder than trained", 10, 1, {"CoolantTemperature": 262.0}),
     Case("charger ignores the command", 11, 3, {"Current": -20.0}),
     Case("voltage against the model", 12, 5, {"Voltage": 3.0}),
     Case("voltage over the limit", 13, 1, {"Voltage": 3.7}),
     Case("core too hot", 14, 1, {"SurfaceTemperature": 324.5, "CoolantTemperature": 300.0}),
     Case("surface too hot", 15, 1, {"SurfaceTemperature": 325.5, "CoolantTemperature": 323.0}),
+    Case("surface colder than the heat allows", 19, 1, {"SurfaceTemperature": 290.0}),
 ]
 
 

@@ -1,0 +1,233 @@
+"""`bms compare-estimators`: the network beside Kalman filters, a perceptron and linear maps."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from bms.commands.options import DataOption
+from bms.errors import InputError
+from bms.files import write_text
+from bms.kan.model_file import load_model, load_shipped_model, shipped_model_path
+from bms.presets import Preset, load_preset
+
+if TYPE_CHECKING:
+    from bms.rivals.comparison import Comparison, NamedModel, Row
+
+DEFAULT_CELL = "lin2014"
+_TABLE_WIDTH = 140
+
+
+def compare_estimators(
+    preset: Annotated[
+        str | None, typer.Option("--preset", help="Simulate the data from it: name or .toml file.")
+    ] = None,
+    data: DataOption = None,
+    model: Annotated[
+        list[Path] | None,
+        typer.Option("--model", help="Network to compare (JSON), besides the preset's own."),
+    ] = None,
+    cell: Annotated[
+        str | None,
+        typer.Option(
+            "--cell",
+            help="With --data: preset (name or .toml) whose cell the filters take as it is; "
+            f"none: that of {DEFAULT_CELL}, fitted to the first two thirds.",
+        ),
+    ] = None,
+    profiles: Annotated[
+        int | None,
+        typer.Option("--profiles", min=1, help="With --preset: profiles of each kind and split."),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option("--seed", min=0, help="Of data and fits; none: the network's.")
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Fit MLP and floor for a moment only: a first look.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for estimators.json and estimators.png.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+) -> None:
+    """Compare the KAN with its rivals: error (K), size, work and time of an estimate in float32 C.
+
+    The rivals are Kalman filters that know the cell, a perceptron of the KAN's size and linear
+    maps; the floor is what a large map of the same four inputs reaches. With --preset the data are
+    whole profiles that no training has seen; with --data the last third of a recording.
+
+    Example: bms compare-estimators --preset paper_calibrated --out out/estimators
+    """
+    # Imported here, so that the other commands start where the firmware is not compiled.
+    from bms.rivals.chart import save_chart  # noqa: PLC0415
+    from bms.rivals.comparison import compare  # noqa: PLC0415
+    from bms.rivals.effort import FULL, QUICK  # noqa: PLC0415
+    from bms.rivals.lagged import all_lags  # noqa: PLC0415
+    from bms.rivals.verdict import verdict  # noqa: PLC0415
+
+    if (preset is None) == (data is None):
+        raise InputError("compare-estimators: give either --preset NAME or --data CSV")
+    if preset is None and profiles is not None:
+        raise InputError("compare-estimators: --profiles belongs to --preset; leave it out")
+    if data is None and cell is not None:
+        raise InputError(
+            "compare-estimators: --cell belongs to --data; with --preset filters get the true cell"
+        )
+    chosen = load_preset(preset or cell or DEFAULT_CELL)
+    models = _models(chosen if data is None else None, model or [])
+    warnings = _warnings(models, data, chosen)
+    lags = all_lags(network.model.network for network in models)
+    of_models = models[0].model.training.settings.seed if models else 0
+    used_seed = of_models if seed is None else seed
+    if out is not None:
+        _make_folder(out)
+    if data is not None:
+        from bms.rivals.recorded import recorded_problem  # noqa: PLC0415
+
+        problem = recorded_problem(data, chosen, cell is None, lags)
+    else:
+        from bms.rivals.simulated import simulated_problem  # noqa: PLC0415
+
+        problem = simulated_problem(chosen, used_seed, lags, profiles)
+    comparison = compare(problem, models, used_seed, time.perf_counter_ns, QUICK if quick else FULL)
+    sentences = verdict(comparison)
+    result = {
+        "data": comparison.title,
+        "seed": used_seed,
+        "quick": quick,
+        "estimators": [_content(row) for row in comparison.rows],
+        "verdict": sentences,
+        "warnings": warnings,
+    }
+    text = json.dumps(result, indent=1)
+    if out is not None:
+        write_text(out / "estimators.json", text + "\n")
+        save_chart(comparison, out / "estimators.png")
+    if as_json:
+        typer.echo(text)
+    else:
+        _print(comparison, quick)
+        typer.echo("\n".join(sentences))
+    for warning in warnings:
+        typer.echo(f"warning: {warning}", err=True)
+
+
+def _models(preset: Preset | None, paths: list[Path]) -> list[NamedModel]:
+    """The preset's own network first, then those of the files, which can do without it."""
+    from bms.rivals.comparison import NamedModel  # noqa: PLC0415
+
+    models = []
+    if preset is not None and (shipped_model_path(preset.name).is_file() or not paths):
+        models.append(NamedModel("KAN", load_shipped_model(preset.name)))
+    for path in paths:
+        loaded = load_model(path)
+        kind = "lagged KAN" if loaded.network.lags else "KAN"
+        models.append(NamedModel(f"{kind} ({path.stem})", loaded))
+    names = [name for name, _ in models]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"--model: two files would both be called {name}; rename one")
+    return models
+
+
+def _warnings(models: list[NamedModel], data: Path | None, preset: Preset) -> list[str]:
+    """One line for every network that was trained on something else."""
+    if data is None:
+        strangers = [name for name, model in models if model.training_hash != preset.training_hash]
+        return [
+            f"{name} was not trained for preset {preset.name} as it is now; its errors are those "
+            "of a network that does not belong to the cell"
+            for name in strangers
+        ]
+    digest = _digest(data)
+    warnings = [
+        f"{name} was not trained on {data.name} but on {model.training.data}; its errors say "
+        "little about the method"
+        for name, model in models
+        if model.training.data_sha256 != digest
+    ]
+    if not models:
+        warnings.append(
+            "no network in the table; train one with 'bms train --data' and give it as --model"
+        )
+    return warnings
+
+
+def _digest(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+
+
+def _make_folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{out}: cannot be made ({error.strerror}); choose another folder"
+        ) from None
+
+
+def _content(row: Row) -> dict[str, Any]:
+    cost = row.cost
+    return {
+        "name": row.name,
+        "given": row.given,
+        "errors": {scope: asdict(figures) for scope, figures in row.errors.items()},
+        "rmse_with_sensor_errors_K": row.read_rmse_K,
+        "parameters": None if cost is None else cost.parameters,
+        "bytes": None if cost is None else cost.bytes,
+        "multiply_adds": None if cost is None else cost.multiply_adds,
+        "time_per_estimate_ns": row.time_per_estimate_ns,
+        "remark": row.remark,
+    }
+
+
+def _print(comparison: Comparison, quick: bool) -> None:
+    scopes = list(comparison.rows[0].errors)
+    counted = comparison.rows[0].counted
+    title = escape(comparison.title) + (", quick fits" if quick else "")
+    table = Table(
+        title=title,
+        caption="errors in K; bytes, multiply-adds and time of one estimate in float32 C",
+        box=SIMPLE_HEAD,
+    )
+    table.add_column("estimator", no_wrap=True)
+    headings = [f"RMSE\n{scope.replace(' ', chr(10))}" for scope in scopes]
+    headings.append(f"largest\n{counted.replace(' ', chr(10))}")
+    has_read = comparison.rows[0].read_rmse_K is not None
+    if has_read:
+        headings.append("RMSE\nwith\nsensors")
+    headings += ["param-\neters", "bytes", "multi-\nply-\nadds", "time\nns"]
+    for heading in headings:
+        table.add_column(heading, justify="right", no_wrap=True)
+    for row in comparison.rows:
+        if not row.errors:
+            table.add_row(row.name, row.remark)
+            continue
+        cost, read_K, time_ns = row.cost, row.read_rmse_K, row.time_per_estimate_ns
+        table.add_row(
+            escape(row.name),
+            *(f"{row.errors[scope].rmse_K:.4f}" for scope in scopes),
+            f"{row.errors[counted].max_abs_error_K:.4f}",
+            *([] if read_K is None else [f"{read_K:.4f}"]),
+            "" if cost is None else str(cost.parameters),
+            "" if cost is None else str(cost.bytes),
+            "" if cost is None else str(cost.multiply_adds),
+            "" if time_ns is None else f"{time_ns:.1f}",
+        )
+    console = Console()
+    # Lines longer than the terminal are better than figures cut off.
+    console.width = max(console.width, _TABLE_WIDTH)
+    console.print(table)

@@ -1,0 +1,116 @@
+"""`bms explain`: what a model has learned."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from bms.commands.options import DataOption
+from bms.data.datasets import simulated_split
+from bms.data.measurements import read_measurements
+from bms.data.simulate import joined
+from bms.errors import InputError
+from bms.files import write_text
+from bms.kan.basis import Array
+from bms.kan.model_file import KanModel, load_model
+from bms.kan.network import INPUT_NAMES
+from bms.presets import load_preset
+
+_PROFILES = 30
+_UNIFORM_POINTS = 20000
+_DPI = 110
+
+
+def explain(
+    model: Annotated[Path, typer.Option("--model", help="Model to explain (JSON).")],
+    out: Annotated[Path, typer.Option("--out", help="Folder for plots, formulas and JSON.")],
+    data: DataOption = None,
+    preset: Annotated[
+        str | None, typer.Option("--preset", help="Simulate the data from it: name or .toml file.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+) -> None:
+    """Show the edge functions of a model, formulas for them, and its sensitivities.
+
+    Each edge is plotted in physical units (A, W, K) over the density of the data that reach it, and
+    approximated by the best of a library of elementary functions, as text and as LaTeX. The data
+    are profiles simulated from the model's preset unless --preset or --data says otherwise.
+
+    Example: bms explain --model model.json --out out/explain
+    """
+    # Imported here, so that the other commands start without Matplotlib's seconds.
+    from bms.explanation import explain as explained  # noqa: PLC0415
+    from bms.explanation.plots import layer_figure, sensitivity_figure  # noqa: PLC0415
+    from bms.explanation.report import Subject, as_latex, as_text  # noqa: PLC0415
+    from bms.explanation.report import as_json as as_content  # noqa: PLC0415
+
+    loaded = load_model(model)
+    inputs, source = _inputs(loaded, data, preset)
+    result = explained(loaded.network, inputs)
+    subject = Subject(model.name, loaded.hash, loaded.network.input_names, source)
+    content = json.dumps(as_content(subject, result), indent=1)
+    figures = {
+        f"edges_layer{number + 1}.png": layer_figure(result, number, subject.input_names)
+        for number in range(len(loaded.network.layers))
+    }
+    figures["sensitivity.png"] = sensitivity_figure(result)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for name, figure in figures.items():
+            figure.savefig(out / name, dpi=_DPI, metadata={"Software": None})
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written ({error.strerror}); choose a folder") from None
+    write_text(out / "explanation.txt", as_text(subject, result))
+    write_text(out / "explanation.tex", as_latex(subject, result))
+    write_text(out / "explanation.json", content + "\n")
+    if as_json:
+        typer.echo(content)
+        return
+    table = Table("edge", "form", "RMSE K", "largest K", "R2")
+    for layer in result.edges:
+        for edge in (edge for row in layer for edge in row):
+            table.add_row(
+                f"layer {edge.layer}, {edge.source} -> {edge.target}",
+                edge.approximation.form,
+                f"{edge.rmse_K:.5f}",
+                f"{edge.max_abs_error_K:.5f}",
+                f"{edge.r_squared:.6f}",
+            )
+    Console().print(table)
+    for symbol, expression in result.formula.steps:
+        typer.echo(f"{symbol} = {expression}")
+    typer.echo(
+        f"formula against the network: RMSE {result.formula_rmse_K:.5f} K, "
+        f"largest {result.formula_max_abs_error_K:.5f} K; files in {out}"
+    )
+
+
+def _inputs(model: KanModel, data: Path | None, preset: str | None) -> tuple[Array, str]:
+    """Inputs (N, n_in) to explain the model by, and where they come from."""
+    network = model.network
+    if data is not None and preset is not None:
+        raise InputError("explain: give --preset NAME or --data CSV, not both")
+    if network.input_names[: len(INPUT_NAMES)] != INPUT_NAMES:
+        if data is not None or preset is not None:
+            raise InputError(f"{model.hash[:8]}: has other inputs than the cell's; give no data")
+        points = np.random.default_rng(0).uniform(
+            -1.0, 1.0, (_UNIFORM_POINTS, len(network.input_names))
+        )
+        center, half = np.array(network.input_center), np.array(network.input_half_range)
+        return center + half * points, "uniform over the box"
+    if data is not None:
+        return read_measurements(data).samples(network.lags).inputs, data.name
+    name = preset or model.preset
+    if name is None:
+        raise InputError(
+            "explain: the model was trained on measurements; give them with --data CSV"
+        )
+    seed = model.training.settings.seed
+    kinds = simulated_split(load_preset(name), "training", seed, _PROFILES, network.lags)
+    return joined(kinds.values()).inputs, f"profiles simulated from preset {name}"
