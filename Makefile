@@ -14,11 +14,11 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c c
 C_WARNINGS := -std=c99 -pedantic -Wall -Wextra -Werror -Wconversion -Wdouble-promotion -Wmissing-prototypes
 C_INCLUDES := -Ifirmware_c/include -Ifirmware_c/src -Ifirmware_c/generated
 
-.PHONY: help run test lint generate models clean
+.PHONY: help run test lint generate models verify-tables clean
 .DEFAULT_GOAL := help
 
 help: ## List the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 run: .venv/runtime ## Charge a cell at 10C over a CAN bus and write a report to out/run
 	$(BIN)/bms sil --baseline s-cbf --out $(OUT)
@@ -41,6 +41,9 @@ models: .venv/runtime ## Train the shipped models anew (both presets) and genera
 	for preset in paper_calibrated lin2014; do \
 	  $(BIN)/bms train --preset $$preset --out bms/models/$$preset.json || exit 1; done
 	$(BIN)/python -m codegen
+
+verify-tables: .venv/runtime ## Try all 2^32 arguments of every edge of the shipped models in C (some 15 minutes)
+	$(BIN)/bms verify-tables --stride 1
 
 clean: ## Remove everything that set-up, build and runs have made
 	rm -rf .venv build out *.egg-info bms/firmware/_firmware.* bms/rivals/_rivals.* hil_sim/campaign/_runner.*

@@ -18,7 +18,7 @@ def write_chart(theorem: TheoremBound, path: Path) -> None:
     """
     mpl.use("Agg")
     from matplotlib import pyplot as plt  # noqa: PLC0415
-    from matplotlib.ticker import NullFormatter, ScalarFormatter  # noqa: PLC0415
+    from matplotlib.ticker import NullLocator, ScalarFormatter  # noqa: PLC0415
 
     figure, axes = plt.subplots(figsize=(7.2, 4.6), layout="constrained")
     axes.loglog(theorem.grids, theorem.largest_K, "o-", color="C0", label="largest, data and box")
@@ -55,7 +55,7 @@ def write_chart(theorem: TheoremBound, path: Path) -> None:
     )
     axes.set_xticks(theorem.grids)
     axes.xaxis.set_major_formatter(ScalarFormatter())
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xlabel("grid intervals G")
     axes.set_ylabel("distance to the smooth network (K)")
     axes.grid(True, which="major", alpha=0.3)

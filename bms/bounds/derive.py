@@ -17,6 +17,8 @@ from bms.presets import Preset
 from bms.tables.rounding import PERIOD_S, arithmetic_error_K, fits_firmware
 
 FULL_EFFORT = Effort()
+SEARCH_SPREAD_K = 2e-3
+"""By how much searches with other seeds, and so other noise, find more (docs/error-bound.md)."""
 
 
 def bounds_for_preset(
@@ -67,12 +69,13 @@ def error_bound_parts_K(
 ) -> dict[str, float]:
     """What e_max is the sum of, in K.
 
-    "estimate" is the bound in use; "sensors" is what errors of the readings add, which measured
-    data hold already (no preset); "arithmetic" is float32 and the tables in the firmware, none for
-    a network that it cannot hold.
+    "estimate" is the bound in use; "search" is what other seeds of the search may find beyond it;
+    "sensors" is what errors of the readings add, which measured data hold already (no preset);
+    "arithmetic" is float32 and the tables in the firmware, none for a network that it cannot hold.
     """
     parts_K = {"estimate": bounds.used_K}
     if preset is not None:
+        parts_K["search"] = SEARCH_SPREAD_K
         parts_K["sensors"] = measurement_error_K(
             network, held_out.inputs, preset.sensors, BusQuantisation()
         )

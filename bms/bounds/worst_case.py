@@ -30,17 +30,19 @@ from bms.presets import Preset
 
 CORE_BEYOND_LIMIT_K = 2.0
 _PIECES = 4
-_DURATION_S = 400.0
-_HOLD_S = (2.0, 200.0)
+_DURATION_S = 300.0
+_HOLD_S = (1.0, 200.0)
 _VARIABLES = 4 + 2 * _PIECES
+_CANDIDATES_PER_DRAWN = 5
+_MUTATION = (0.2, 0.6)
 
 
 @dataclass(frozen=True)
 class Effort:
     """Size of a search: profiles in each generation (5 at least), and generations."""
 
-    candidates: int = 200
-    generations: int = 12
+    candidates: int = 400
+    generations: int = 14
 
     def scaled(self, share: float) -> Effort:
         """The same with a share of candidates and generations, but as many as a search needs."""
@@ -72,6 +74,7 @@ def worst_case(network: Network, preset: Preset, seed: int, effort: Effort) -> W
         init=start,
         maxiter=effort.generations,
         tol=0.0,
+        mutation=_MUTATION,
         polish=False,
         updating="deferred",
         vectorized=True,
@@ -79,7 +82,8 @@ def worst_case(network: Network, preset: Preset, seed: int, effort: Effort) -> W
     )
     searched_K = -float(result.fun)
     rng = np.random.default_rng([seed, 3])
-    random_K = float(errors_K(draw_profiles(preset, "steps", effort.candidates, rng))[1].max())
+    drawn = draw_profiles(preset, "steps", effort.candidates // _CANDIDATES_PER_DRAWN, rng)
+    random_K = float(errors_K(drawn)[1].max())
     profiles = _profiles(preset, result.x[None])
     samples, error_K = errors_K(profiles)
     return WorstCase(
@@ -88,7 +92,7 @@ def worst_case(network: Network, preset: Preset, seed: int, effort: Effort) -> W
         random_K,
         _described(preset, result.x),
         float(samples.time_s[np.argmax(error_K)]),
-        effort.candidates * (effort.generations + 2),
+        effort.candidates * (effort.generations + 1) + len(drawn.initial_soc),
     )
 
 

@@ -62,6 +62,10 @@ def import_pykan(
     if not output_half_range_K > 0.0:
         raise InputError("--output-half-range: must be above 0")
     source = read_checkpoint(checkpoint)
+    if data is not None and len(source.layers[0].knots) != len(INPUT_NAMES):
+        raise InputError(
+            f"--data: cannot test {checkpoint}, which has not the four inputs; leave it out"
+        )
     default_center, default_half = _box(chosen, len(source.layers[0].knots))
     halves = default_half if half_range is None else _numbers("--half-range", half_range)
     if min(halves) <= 0.0:

@@ -104,7 +104,7 @@ def _edge(
     network: Network,
     place: tuple[int, int, int],
     edge: Edge,
-    node_values: list[Array],
+    nodes: list[Array],
     gains_K: list[Array],
 ) -> EdgeExplanation:
     layer, source, target = place
@@ -117,7 +117,7 @@ def _edge(
     def function(x: Array) -> Array:
         return unit * edge.evaluate((x - center) / half, network.degree)[0]
 
-    samples = center + half * node_values[layer][:, source]
+    samples = center + half * nodes[layer][:, source]
     gain_K = np.maximum(np.abs(gains_K[layer + 1][:, target]) / unit, _LEAST_GAIN_K)
     bins, density, weights_K2 = _histogram(samples, gain_K)
     middles = 0.5 * (bins[1:] + bins[:-1])

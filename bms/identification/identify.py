@@ -48,6 +48,8 @@ _STRETCHES = (
 )
 """Starts: factors on core resistance, surface resistance and surface heat capacity."""
 _SAME_MINIMUM = 1e-4
+_MOST_STEPS = 40
+"""A fit that takes more wanders along a direction that the data do not fix."""
 _FEWEST_ROWS = 100
 
 
@@ -182,6 +184,7 @@ def _fit(
                 _values(stretched, names),
                 bounds=(center - reach, center + reach),
                 x_scale=np.where(np.array(names) == _ENTROPIC, 1.0, 0.3),
+                max_nfev=_MOST_STEPS,
             )
         )
     best = min(found, key=lambda fit: float(fit.cost))

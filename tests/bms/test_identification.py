@@ -1,19 +1,23 @@
 """Cell parameters from measured temperatures: recovery of known cells, and honesty about limits."""
 
 import dataclasses
+import json
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bms.cell import CellState, integrate_step
-from bms.data.measurements import Measurements, read_measurements
+from bms.cli import main
+from bms.data.measurements import COLUMNS, Measurements, read_measurements
 from bms.errors import InputError
 from bms.identification import identify
 from bms.identification.preset_toml import preset_toml
 from bms.identification.trajectory import thermal_trajectory
 from bms.presets import load_preset, preset_names
 from bms.validation import parse, read_toml
+from tests.bms.kan_samples import write_recording
 
 MEASURED = Path(__file__).parents[3] / "shared" / "data" / "a123_26650_hev_cycle_1.csv"
 START = load_preset("lin2014")
@@ -98,6 +102,22 @@ def test_noisy_temperatures_give_the_cell_within_the_standard_errors():
     assert (result.fitted.rows, result.held_out.rows) == (1000, 200)
     assert result.held_out.core_rmse_K == pytest.approx(0.05, rel=0.15)
     assert result.held_out.surface_rmse_K == pytest.approx(0.05, rel=0.15)
+
+
+def test_standard_errors_never_claim_more_than_the_sensors_can_tell():
+    """Noise-free data: the errors are those of the preset's sensors, and scale with them."""
+    recording = recorded(TRUTH)
+    channel = dataclasses.replace(START.sensors.surface_temperature_K, resolution=1.0)
+    coarse = dataclasses.replace(
+        START, sensors=dataclasses.replace(START.sensors, surface_temperature_K=channel)
+    )
+
+    fine, rough = (estimates(identify(recording, start)) for start in (START, coarse))
+
+    ratio = channel.error_bound / START.sensors.surface_temperature_K.error_bound
+    name = "core_resistance_K_per_W"
+    assert fine[name].standard_error > 0.0
+    assert rough[name].standard_error == pytest.approx(ratio * fine[name].standard_error, rel=0.01)
 
 
 def test_noise_beyond_the_fitted_rows_does_not_change_the_cell():
@@ -186,3 +206,78 @@ def test_measured_drive_cycle():
     assert result.held_out.core_rmse_K < 0.92
     assert result.held_out.surface_rmse_K < 0.57
     assert 0.008 < result.cell.ohmic_resistance_ohm < 0.0241
+
+
+@pytest.fixture
+def bms(monkeypatch, capsys):
+    """Calls the command line; gives exit code, stdout and stderr."""
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["bms", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stop:
+            main()
+        captured = capsys.readouterr()
+        return stop.value.code, captured.out, captured.err
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def csv(tmp_path_factory):
+    """A recording of the known cell as CSV."""
+    recording = recorded(TRUTH, rows=450, noise_K=0.01)
+    columns = {name: getattr(recording, name) for name in COLUMNS}
+    path = tmp_path_factory.mktemp("recording") / "run.csv"
+    return write_recording(path, rows=450, **columns)
+
+
+def test_command_writes_a_preset_with_the_cell_that_it_prints(bms, csv, tmp_path):
+    code, out, _ = bms("identify", "--data", csv, "--out", tmp_path / "mine.toml", "--json")
+
+    result, preset = json.loads(out), load_preset(tmp_path / "mine.toml")
+    assert code == 0
+    assert preset.name == "mine"
+    assert "run.csv" in preset.description
+    for name, parameter in result["parameters"].items():
+        assert getattr(preset.cell, name) == pytest.approx(parameter["value"], rel=1e-5)
+        assert parameter["start"] == getattr(START.cell, name)
+    assert preset.cell.core_resistance_K_per_W == pytest.approx(2.6, rel=0.05)
+    assert (result["fitted"]["rows"], result["held_out"]["rows"]) == (300, 150)
+    assert result["held_out"]["core_rmse_K"] < 0.05
+    assert dataclasses.replace(preset, name="", description="", sources=(), cell=START.cell) == (
+        dataclasses.replace(START, name="", description="", sources=())
+    )
+
+
+def test_command_prints_what_was_not_identified(bms, csv):
+    code, out, _ = bms("identify", "--data", csv)
+
+    text = " ".join(out.replace("│", " ").split())
+    assert code == 0
+    assert "core_heat_capacity_J_per_K" in text
+    assert "kept" in text
+    assert "strongest correlation" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ([], "--data"),
+        (["--data", "{tmp}/absent.csv"], "absent.csv"),
+        (["--data", "{csv}", "--preset", "nobody"], "nobody"),
+        (["--data", "{csv}", "--out", "{tmp}/mine.json"], ".toml"),
+        (["--data", "{csv}", "--out", "{tmp}/absent/mine.toml"], "cannot be written"),
+        (["--data", "{short}"], "at least 100"),
+    ],
+)
+def test_wrong_use_is_one_line_on_stderr_and_exit_2(bms, csv, tmp_path, arguments, told):
+    short = write_recording(tmp_path / "short.csv", rows=120)
+    places = {"tmp": tmp_path, "csv": csv, "short": short}
+
+    code, out, err = bms("identify", *(argument.format(**places) for argument in arguments))
+
+    assert code == 2
+    assert out == ""
+    assert told in err
+    assert len(err.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["short.csv"]

@@ -125,7 +125,7 @@ def test_without_room_for_wider_grids_what_is_beyond_them_is_flagged(tmp_path):
 
 
 def test_scales_and_shifts_of_nodes_are_folded_exactly(tmp_path):
-    model = trained((2, 2, 1), grid=3)
+    model = trained((2, 1, 1), grid=3)
     with torch.no_grad():
         for number in range(2):
             for name, value in (
@@ -327,6 +327,7 @@ def test_command_scales_inputs_and_output_and_tests_on_a_recording(bms, tmp_path
         (["import-pykan", "{net}", "--out", "{tmp}/m.json", "--half-range", "1,x"], "1,x"),
         (["import-pykan", "{net}", "--out", "{tmp}/m.json", "--half-range", "1,-1"], "half"),
         (["import-pykan", "{net}", "--out", "{tmp}/m.json", "--preset", "nobody"], "nobody"),
+        (["import-pykan", "{net}", "--out", "{tmp}/m.json", "--data", "x.csv"], "four inputs"),
         (
             ["import-pykan", "{net}", "--out", "{tmp}/m.json", "--output-half-range", "0"],
             "--output-half-range",

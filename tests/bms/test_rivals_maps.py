@@ -66,7 +66,7 @@ def test_linear_map_of_a_channel_that_does_not_vary_stays_small(samples):
     moved = still.inputs.copy()
     moved[:, 1] = 1.0
 
-    estimator = LinearEstimator("linear", still, BASE_COLUMNS)
+    estimator = LinearEstimator("linear", still, BASE_COLUMNS, ())
 
     changed_K = estimate(estimator, dataclasses.replace(still, inputs=moved))
     assert np.abs(changed_K - estimate(estimator, still)).max() < FLOAT32_K

@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 
 from bms.cli import main
+from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
+from bms.data.profiles import draw_profiles
+from bms.data.simulate import simulate
+from bms.kan.lags import Lag
 from bms.kan.model_file import load_model, load_shipped_model, shipped_model_path
-from bms.presets import DEFAULT_PRESET, load_preset
+from bms.presets import DEFAULT_PRESET, load_preset, preset_names
 from tests.bms.kan_samples import write_recording
 
 KEYS = {"rmse_K", "max_abs_error_K", "bias_K", "samples", "extrapolated_samples"}
@@ -108,6 +112,60 @@ def test_shipped_model_holds_the_papers_rmse_on_profiles_drawn_anew(bms):
     assert result["max_abs_error_K"] <= load_shipped_model(DEFAULT_PRESET).error_bound_K
 
 
+def test_lagged_model_of_a_recording_is_the_same_in_c_with_its_own_filters(
+    bms, recording, tmp_path
+):
+    """A core that only its past explains: the static model cannot follow, the lagged one can."""
+    data = read_measurements(recording)
+    filtered = data.samples((Lag("current_squared_A2", 20.0),)).inputs[:, 4]
+    delayed = write_recording(
+        tmp_path / "delayed.csv",
+        rows=len(data.time_s),
+        core_temperature_K=(data.surface_temperature_K + 0.01 * filtered).tolist(),
+    )
+    rmse_K = {}
+    for name, options in {"static": [], "lagged": ["--lag-time-constants", "20"]}.items():
+        model_path = tmp_path / f"{name}.json"
+        assert bms("train", "--data", delayed, "--out", model_path, *options)[0] == 0
+        for engine in ("c", "python"):
+            _, out, _ = bms(
+                "evaluate", "--model", model_path, "--data", delayed, "--engine", engine, "--json"
+            )
+            rmse_K[name, engine] = json.loads(out)["rmse_K"]
+    assert rmse_K["lagged", "c"] == pytest.approx(rmse_K["lagged", "python"], abs=2e-4)
+    assert rmse_K["lagged", "c"] < 0.05 * rmse_K["static", "c"]
+    model = load_model(tmp_path / "lagged.json")
+    assert model.network.width == (6, 1, 1)
+    assert model.network.input_names[4:] == (
+        "current_squared_A2_filtered_20s",
+        "surface_temperature_rise_K_filtered_20s",
+    )
+
+
+def test_lagged_without_constants_takes_those_of_the_kind_of_data(bms, recording, tmp_path):
+    bms("train", "--data", recording, "--out", tmp_path / "model.json", "--lagged")
+    assert load_model(tmp_path / "model.json").training.settings.lag_time_constants_s == (10, 160)
+
+
+@pytest.mark.parametrize("preset", preset_names())
+def test_shipped_models_hold_the_promised_accuracy_on_whole_unseen_profiles(preset):
+    """Half a dynamic error and a tenth of a kelvin at full steps is what remembering must bring."""
+    chosen = load_preset(preset)
+    rmse_K = {}
+    for lagged in (False, True):
+        network = load_model(shipped_model_path(preset, lagged)).network
+        for kind, samples in simulated_split(chosen, "evaluation", 0, lags=network.lags).items():
+            error_K = network.evaluate(samples.inputs)[0] - samples.core_temperature_K
+            rmse_K[lagged, kind] = math.sqrt(np.mean(error_K**2))
+    assert rmse_K[False, "constant"] <= 0.02
+    assert rmse_K[False, "dynamic"] <= 0.04
+    assert rmse_K[True, "dynamic"] <= 0.5 * rmse_K[False, "dynamic"]
+    rng = np.random.default_rng(77)
+    steps = simulate(chosen, draw_profiles(chosen, "steps", 30, rng), rng, network.lags)
+    error_K = network.evaluate(steps.inputs)[0] - steps.core_temperature_K
+    assert np.abs(error_K).max() <= 0.1
+
+
 def test_table_without_json_names_every_figure(bms, recording, tmp_path):
     bms("train", "--data", recording, "--out", tmp_path / "model.json", *QUICK)
 
@@ -133,6 +191,14 @@ def test_table_without_json_names_every_figure(bms, recording, tmp_path):
         (["train", "--data", "{data}", "--out", "{tmp}/m.json", "--width", "3,1"], "width"),
         (["train", "--data", "{data}", "--out", "{tmp}/m.json", "--width", "4,2"], "end in 1"),
         (["train", "--data", "{data}", "--out", "{tmp}/m.json", "--grid", "0"], "grid"),
+        (
+            ["train", "--data", "{data}", "--out", "{tmp}/m.json", "--lag-time-constants", "1,-2"],
+            "lag_time_constants_s",
+        ),
+        (
+            ["train", "--data", "{data}", "--out", "{tmp}/m.json", "--lagged", "--width", "4,1,1"],
+            "must begin with 8",
+        ),
         (["train", "--data", "{data}", "--out", "{tmp}/m.json", "--seed", "-1"], "seed"),
         (["train", "--preset", "lin2014"], "--out"),
         (["evaluate", "--model", "{model}"], "either --preset NAME or --data CSV"),

@@ -48,6 +48,18 @@ def test_current_grows_by_the_preset_s_limit_and_shrinks_at_once() -> None:
     assert bench.command_A == pytest.approx(-3.0, abs=0.0021)
 
 
+def test_what_the_heat_allows_stands_in_for_a_surface_that_reads_colder() -> None:
+    bench = Bench()
+    before_K = bench.start()["CoreTemperature"]
+    for _ in range(10):
+        bench.period(SurfaceTemperature=298.2)
+        assert bench.answer["ActiveFaults"] == 0
+        assert before_K - 0.5 < bench.answer["CoreTemperature"]
+    assert bench.command_A < 0.0
+    bench.period(SurfaceTemperature=299.4)
+    assert bench.answer["CoreTemperature"] > before_K + 0.2
+
+
 def test_an_ecu_that_starts_in_mid_charge_waits_for_the_edge() -> None:
     """It does not know how much was charged, so the old state of charge must not be taken."""
     bench = Bench()

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from bms.errors import InputError
 from bms.firmware import CompiledNetwork, Firmware
-from bms.kan.model_file import KanModel, load_shipped_model
+from bms.kan.model_file import KanModel, load_model, load_shipped_model, shipped_model_path
 from bms.kan.network import Edge, Network
 from bms.tables import network_tables
 
@@ -132,6 +132,29 @@ def test_estimate_outside_the_box_is_flagged_and_clamped(
     assert estimate.core_temperature_K == pytest.approx(
         firmware.estimate(**edge).core_temperature_K, abs=1e-4
     )
+
+
+def test_a_combination_never_seen_is_flagged_though_each_value_is_in_its_range() -> None:
+    torn = {**INSIDE, "current_A": -14.7, "surface_temperature_K": 304.0}
+    torn["coolant_temperature_K"] = 321.0
+    box = lin2014().preset.operating_box
+    assert all(
+        getattr(box, name)[0] < value < getattr(box, name)[1] for name, value in torn.items()
+    )
+    assert not lin2014().estimate(**torn).in_domain
+
+
+@pytest.mark.parametrize("lagged", [False, True])
+@pytest.mark.parametrize("preset", PRESETS)
+def test_c_and_python_flag_the_same_points(preset: str, lagged: bool) -> None:
+    model = load_model(shipped_model_path(preset, lagged))
+    points = box_points(model.network, 100_000, seed=3)
+    in_c = CompiledNetwork(model).evaluate(points)[1]
+    in_python = model.network.evaluate(points)[1]
+    # Points on a face of the box or of a slab may fall on either side of it in float32.
+    random = slice(50_000, None)
+    assert np.mean(in_c[random] != in_python[random]) < 1e-4
+    assert 0.02 < np.mean(in_python[random]) < 0.98
 
 
 @given(name=st.sampled_from(sorted(INSIDE)), bad=st.sampled_from([math.nan, math.inf, -math.inf]))

@@ -30,6 +30,7 @@ class Mutant:
 
 
 DECISION, STATES = "tests/firmware/test_rcbf.py", "tests/firmware/test_ecu_states.py"
+HISTORY, THERMAL = "tests/firmware/test_history.py", "tests/firmware/test_thermal.py"
 FAULTS, ESTIMATE = "tests/firmware/test_ecu_faults.py", "tests/firmware/test_kan.py"
 MARGINS = "names_the_constraint"
 
@@ -42,6 +43,15 @@ MUTANTS = [
     Mutant("an empty interval gives 0 A", "rcbf.c", "decision.feasible ? decision.lower_A : 0.0f", "decision.lower_A", DECISION, "infeasible"),
     Mutant("not a number is refused", "rcbf.c", "if (!is_physical(input))", "if (input->reference_current_A > 0.0f)", DECISION, "no_number"),
     Mutant("extrapolation is flagged", "kan.c", "estimate.in_domain = false;", "estimate.in_domain = true;", ESTIMATE, "flagged"),
+    Mutant("combinations never seen are flagged", "kan.c", "is_in_slabs(model, nodes) && ", "", ESTIMATE, "combination"),
+    Mutant("filters are trusted only when settled", "history.c", "history->periods >= model->settling_periods", "history->periods >= 0u", HISTORY, "init_until"),
+    Mutant("an ECU with memory waits in init", "bms.c", "if (history_is_settling(", "if (!history_is_settling(", HISTORY, "init_until"),
+    Mutant("a gap starts the history anew", "history.c", "bridged > HISTORY_MAX_BRIDGED", "bridged > 9999u", HISTORY, "gap"),
+    Mutant("filters are deaf to what is no number", "history.c", "is_usable && numeric_is_finite(current_A) &&", "is_usable ||", HISTORY, "bridged"),
+    Mutant("a surface colder than the heat allows is a fault", "bms.c", "limits->surface_deficit_K),", "9999.0f),", FAULTS, "colder"),
+    Mutant("the prediction warms with the current", "thermal.c", "constants->gain_K_per_W[0] * heat_W", "0.0f * heat_W", THERMAL, "undisturbed"),
+    Mutant("the prediction's error is granted", "thermal.c", " - constants->error_bound_K", "", THERMAL, "within_the_modelled"),
+    Mutant("the heat stands in for a sensor that reads cold", "bms.c", "bms->surface_temperature_K = coldest_K;", "(void)0;", STATES, "stands_in"),
     Mutant("a latched fault ends the charge", "bms.c", "bms->state = BMS_FAULT;\n    }\n    const", "bms->state = bms->state;\n    }\n    const", FAULTS, "stops_the_charge"),
     Mutant("a symptom stops at once", "bms.c", "!bms->monitor.stop &&", "", FAULTS, "stops_the_charge"),
     Mutant("silence is noticed", "bms.c", "bms->inbox[i].fresh = false;", "(void)0;", FAULTS, "lost"),

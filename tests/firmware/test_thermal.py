@@ -40,8 +40,8 @@ def charge(preset: Preset, seconds: float, seed: int) -> Any:
     return np.where(np.arange(periods) < 1500, -23.0, held)
 
 
-def smallest_excess_K(preset: Preset, disturbance: Disturbance, errors: np.ndarray) -> np.ndarray:
-    """Least reading of the surface above the coldest possible in each of N charges from rest.
+def excess_range_K(preset: Preset, disturbance: Disturbance, errors: np.ndarray) -> np.ndarray:
+    """Least and largest (2, N) of how far the surface reads above the coldest possible, from rest.
 
     The disturbance's parts and the sensors' errors of current, surface and coolant (3, N) are kept.
     """
@@ -50,7 +50,7 @@ def smallest_excess_K(preset: Preset, disturbance: Disturbance, errors: np.ndarr
     start_K = np.full(errors.shape[1], preset.initial.temperature_K)
     state = CellState(0.05 * np.ones_like(start_K), start_K, start_K, start_K)
     predictions = [Prediction(preset) for _ in start_K]
-    smallest = np.full(errors.shape[1], np.inf)
+    smallest, largest = np.full_like(start_K, np.inf), np.full_like(start_K, -np.inf)
     before_A = 0.0
     for current_A in [0.0, *charge(preset, 600.0, seed=4).tolist()]:
         coldest_K = np.array(
@@ -64,11 +64,12 @@ def smallest_excess_K(preset: Preset, disturbance: Disturbance, errors: np.ndarr
                 )
             ]
         )
-        smallest = np.minimum(smallest, state.surface_temperature_K + surface_error_K - coldest_K)
+        excess_K = state.surface_temperature_K + surface_error_K - coldest_K
+        smallest, largest = np.minimum(smallest, excess_K), np.maximum(largest, excess_K)
         for _ in range(SUB_STEPS):
             state = integrate_step(preset.cell, state, current_A, 0.3, step_s, disturbance)
         before_A = current_A
-    return smallest
+    return np.stack([smallest, largest])
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -83,8 +84,8 @@ def test_undisturbed_prediction_is_the_surface_itself(name: str) -> None:
     preset = load_preset(name)
     bound_K = surface_prediction(preset.cell, preset).error_bound_K
     zero = np.zeros(1)
-    excess_K = smallest_excess_K(preset, Disturbance(0.0, zero, zero, zero), np.zeros((3, 1)))
-    assert excess_K == pytest.approx([bound_K], abs=5e-3)
+    excess_K = excess_range_K(preset, Disturbance(0.0, zero, zero, zero), np.zeros((3, 1)))
+    assert excess_K == pytest.approx(np.full((2, 1), bound_K), abs=5e-3)
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -101,7 +102,7 @@ def test_nothing_within_the_modelled_uncertainty_reads_as_a_deficit(name: str) -
         sensors.surface_temperature_K.error_bound + bus.surface_temperature_K,
         sensors.coolant_temperature_K.error_bound + bus.coolant_temperature_K,
     ]
-    excess_K = smallest_excess_K(preset, disturbance, signs[2:] * np.array(worst)[:, None])
+    excess_K = excess_range_K(preset, disturbance, signs[2:] * np.array(worst)[:, None])[0]
     assert excess_K.min() >= 0.0
     # These histories come near the bound, so it is not much wider than it has to be.
     assert excess_K.min() < 0.6 * surface_prediction(preset.cell, preset).error_bound_K
