@@ -37,9 +37,10 @@ lint: .venv/tests ## Types, style and C warnings
 generate: .venv/runtime ## Write firmware_c/generated anew from preset, model and CAN database
 	$(BIN)/python -m codegen
 
-models: .venv/runtime ## Train the shipped models anew (both presets) and generate the tables
+models: .venv/runtime ## Train the shipped models anew (both presets, lagged too), generate the tables
 	for preset in paper_calibrated lin2014; do \
-	  $(BIN)/bms train --preset $$preset --out bms/models/$$preset.json || exit 1; done
+	  $(BIN)/bms train --preset $$preset --out bms/models/$$preset.json || exit 1; \
+	  $(BIN)/bms train --preset $$preset --lagged --out bms/models/$${preset}_lagged.json || exit 1; done
 	$(BIN)/python -m codegen
 
 verify-tables: .venv/runtime ## Try all 2^32 arguments of every edge of the shipped models in C (some 15 minutes)

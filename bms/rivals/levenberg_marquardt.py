@@ -29,14 +29,12 @@ def descended(
     values, left = start, residuals(start)
     square, damping = float(np.sum(left**2)), _FIRST_DAMPING
     normal = _normal_equations(slopes(values), left)
-    scale = np.diag(normal[:-1, :-1]).copy()
+    damping *= float(np.trace(normal[:-1, :-1])) / len(start)
     for _ in range(steps):
         if damping > _LARGEST_DAMPING:
             break
-        scale = np.maximum(scale, np.diag(normal[:-1, :-1]))
-        unit = 1.0 / np.sqrt(scale)
-        scaled = normal[:-1, :-1] * np.outer(unit, unit) + damping * np.eye(len(unit))
-        tried = values - unit * np.linalg.solve(scaled, unit * normal[:-1, -1])
+        damped = normal[:-1, :-1] + damping * np.eye(len(values))
+        tried = values - np.linalg.solve(damped, normal[:-1, -1])
         left = residuals(tried)
         tried_square = float(np.sum(left**2))
         # Not a number counts as a failure.

@@ -103,9 +103,10 @@ class EdgeSweep:
         Between knots the edge is interpolated at Chebyshev nodes, with less than 1e-13 of error;
         where it is constant the result has shape (1,).
         """
+        ends_unknown = np.isnan(x[[0, -1]])
+        if ends_unknown.any():
+            return self._end_values[:1] if ends_unknown.all() else self.exact(x)
         low, high = sorted((float(x[0]), float(x[-1])))
-        if np.isnan(x[0]) and np.isnan(x[-1]):
-            return self._end_values[:1]
         if high < self._knots[0]:
             return self._end_values[:1]
         if low > self._knots[-1]:

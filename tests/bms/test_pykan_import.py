@@ -360,4 +360,3 @@ def test_example_of_the_documentation_runs(bms, tmp_path, monkeypatch):
     assert model.preset == DEFAULT_PRESET
     assert model.errors["test"].overall.rmse_K < 0.5
     assert Firmware(DEFAULT_PRESET, model).model.hash == model.hash
-    assert (tmp_path / "explained" / "explanation.txt").is_file()

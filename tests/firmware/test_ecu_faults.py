@@ -58,6 +58,7 @@ CASES = [
     Case("reference discharges", 9, 1, {"ReferenceCurrent": 1.0}),
     Case("start not available", 9, 1, {"PlugInStateOfCharge": 1.3107}),
     Case("coolant colder than trained", 10, 1, {"CoolantTemperature": 262.0}),
+    Case("combination never seen", 10, 1, {"CoolantTemperature": 321.0}),
     Case("charger ignores the command", 11, 3, {"Current": -20.0}),
     Case("voltage against the model", 12, 5, {"Voltage": 3.0}),
     Case("voltage over the limit", 13, 1, {"Voltage": 3.7}),

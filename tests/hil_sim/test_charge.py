@@ -6,6 +6,7 @@ import pytest
 
 from bms.errors import BusError, ModelMismatchError
 from bms.firmware import Ecu
+from bms.kan.model_file import shipped_model_path
 from bms.presets import load_preset
 from hil_sim.disturbances import DisturbanceKind
 from hil_sim.recorder import Recorder
@@ -35,6 +36,17 @@ def test_a_full_charge_keeps_every_limit(any_preset, disturbance, charger_delay_
     assert summary.final_soc == pytest.approx(any_preset.limits.completion_soc, abs=2e-3)
     assert summary.kan_max_abs_error_K <= summary.error_bound_K
     assert 0.0 < summary.first_derate_s < summary.charge_time_s
+
+
+@pytest.mark.parametrize("disturbance", [DisturbanceKind.NONE, DisturbanceKind.BANG_BANG])
+def test_a_model_that_remembers_keeps_every_limit_and_charges_faster(preset, disturbance):
+    remembering = shipped_model_path(preset.name, lagged=True)
+    static = run_both(Settings(preset, disturbance=disturbance)).summary
+    lagged = run_both(Settings(preset, model=remembering, disturbance=disturbance)).summary
+    assert lagged.violations == ()
+    assert lagged.stop_reason == "complete"
+    assert lagged.kan_max_abs_error_K <= lagged.error_bound_K < 0.5 * static.error_bound_K
+    assert lagged.charge_time_s < static.charge_time_s
 
 
 def test_limits_that_the_firmware_does_not_keep_are_seen(preset):
