@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
 
 from bms.barrier.margins import BusQuantisation
 from bms.cell import CellParameters
@@ -44,6 +43,9 @@ def surface_prediction(
     The bound covers the preset's disturbances, the errors of the current, coolant and surface
     sensors and of the bus, for a cell that was at rest when the prediction began.
     """
+    # Imported here, so that an ECU with the compiled-in constants starts without SciPy.
+    from scipy.linalg import expm  # noqa: PLC0415
+
     rc, cc = cell.core_resistance_K_per_W, cell.core_heat_capacity_J_per_K
     rs, cs = cell.surface_resistance_K_per_W, cell.surface_heat_capacity_J_per_K
     augmented = np.zeros((4, 4))

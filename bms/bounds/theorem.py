@@ -18,15 +18,15 @@ from bms.bounds.fitting import Layers, Points, fitted
 from bms.bounds.rate import fit_rate
 from bms.bounds.record import TheoremBound
 from bms.data.simulate import Samples
-from bms.kan.basis import Array, basis, silu, uniform_knots
-from bms.kan.network import Layer, Network
+from bms.kan.basis import Array, basis, uniform_knots
+from bms.kan.network import Network
 from bms.kan.trainable import TrainableLayer, forward
 
 GRIDS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 _MOST_PARAMETERS = 500
 _SMOOTH_ORDERS_BEYOND = 5
 _FITTED, _MEASURED = 2**11, 2**14
-_HIDDEN_MARGIN = 0.05
+_FIRST_MARGIN, _HIDDEN_MARGIN = 0.2, 0.05
 _PROBES = 40
 
 Spans = list[list[tuple[float, float]]]
@@ -37,9 +37,11 @@ def theorem_bound(network: Network, data: Samples, seed: int) -> TheoremBound:
     """Sweep for networks of this one's width and degree, on the data that it was trained on."""
     rng = np.random.default_rng(seed)
     points = _normalised(network, data, rng.permutation(len(data.inputs))[:_MEASURED])
-    box = rng.uniform(-1.0, 1.0, (len(points.x), _MEASURED))
-    spans = _spans(network, points.x)
-    smooth = _smooth(network, spans, points)
+    smooth = _smooth(network, points)
+    spans = _spans(smooth, points.x, _HIDDEN_MARGIN)
+    box = _within(
+        smooth, _spans(smooth, points.x, 0.0), rng.uniform(-1.0, 1.0, (len(points.x), _MEASURED))
+    )
     on_data, on_box = forward(smooth, points.x)[0], forward(smooth, box)[0]
     mixed = np.hstack([points.x[:, :_FITTED], box[:, :_FITTED]])
     target = Points(mixed, forward(smooth, mixed)[0])
@@ -103,37 +105,54 @@ def _grids(network: Network) -> list[int]:
     return small if len(small) >= 3 else list(GRIDS[:3])
 
 
-def _spans(network: Network, x: Array) -> Spans:
-    """Range of every node: -1..1 for the inputs, of hidden ones what the data reach and 5 %."""
+def _hidden(layers: Layers, x: Array) -> list[Array]:
+    """Values of all hidden nodes, layer by layer, (out, N) each."""
+    return [forward(layers[:number], x) for number in range(1, len(layers))]
+
+
+def _spans(layers: Layers, x: Array, margin: float) -> Spans:
+    """Range of every node: -1..1 for the inputs, of hidden ones what x reaches and a margin."""
     spans: Spans = [[(-1.0, 1.0)] * len(x)]
-    nodes = np.clip(x, -1.0, 1.0)
-    for layer in network.layers[:-1]:
-        nodes = np.stack(
-            [
-                np.sum([e.evaluate(v, network.degree)[0] for e, v in zip(row, nodes)], axis=0)
-                for row in layer
-            ]
-        )
-        margins = [_HIDDEN_MARGIN * max(float(np.ptp(node)), 1e-3) for node in nodes]
-        spans.append([(float(v.min()) - m, float(v.max()) + m) for v, m in zip(nodes, margins)])
+    for nodes in _hidden(layers, x):
+        beyond = margin * np.maximum(np.ptp(nodes, axis=1), 1e-3)
+        low, high = nodes.min(axis=1) - beyond, nodes.max(axis=1) + beyond
+        spans.append(list(zip(low.tolist(), high.tolist())))
     return spans
 
 
-def _smooth(network: Network, spans: Spans, points: Points) -> Layers:
+def _within(layers: Layers, spans: Spans, x: Array) -> Array:
+    """Those columns of x whose hidden values lie in the spans; others would not be trusted."""
+    inside = np.ones(x.shape[1], dtype=np.bool_)
+    for nodes, ranges in zip(_hidden(layers, x), spans[1:]):
+        low, high = np.transpose(np.asarray(ranges))[:, :, None]
+        inside &= np.all((nodes >= low) & (nodes <= high), axis=0)
+    return np.ascontiguousarray(x[:, inside])
+
+
+def _smooth(network: Network, points: Points) -> Layers:
     """Network with one polynomial for each edge, fitted to the data from the given network on."""
+    own = _as_layers(network)
     order = network.degree + _SMOOTH_ORDERS_BEYOND
+    smooth = _regridded(own, 1, order, _spans(own, points.x, _FIRST_MARGIN))
+    smooth = fitted(smooth, points)
+    return fitted(_regridded(smooth, 1, order, _spans(smooth, points.x, _HIDDEN_MARGIN)), points)
+
+
+def _as_layers(network: Network) -> Layers:
+    """The network for a fit; the edges that leave one node must share its knots."""
     layers = []
-    for layer, ranges in zip(network.layers, spans):
-
-        def parts(source: int, x: Array, layer: Layer = layer) -> Array:
-            edges = [row[source] for row in layer]
-            return np.stack(
-                [e.evaluate(x, network.degree)[0] - e.base_weight * silu(x) for e in edges]
+    for layer in network.layers:
+        coefficients = [[e.coefficients for e in row] for row in layer]
+        layers.append(
+            TrainableLayer(
+                network.degree,
+                np.array([edge.knots for edge in layer[0]]),
+                np.array([[edge.base_weight for edge in row] for row in layer]),
+                np.array([[edge.spline_weight for edge in row] for row in layer]),
+                np.array(coefficients),
             )
-
-        base_weights = np.array([[edge.base_weight for edge in row] for row in layer])
-        layers.append(_layer(order, 1, ranges, base_weights, parts))
-    return fitted(layers, points)
+        )
+    return layers
 
 
 def _regridded(layers: Layers, grid: int, degree: int, spans: Spans) -> Layers:
@@ -143,7 +162,10 @@ def _regridded(layers: Layers, grid: int, degree: int, spans: Spans) -> Layers:
 
         def parts(source: int, x: Array, layer: TrainableLayer = layer) -> Array:
             weighted = layer.spline_weights[:, [source]] * layer.coefficients[:, source]
-            return np.asarray(weighted @ basis(x, layer.knots[source], layer.degree))
+            low, high = layer.knots[source][[layer.degree, -layer.degree - 1]]
+            return np.asarray(
+                weighted @ basis(np.clip(x, low, high), layer.knots[source], layer.degree)
+            )
 
         new.append(_layer(degree, grid, ranges, layer.base_weights, parts))
     return new

@@ -71,7 +71,7 @@ def _curvature(grid: Array, knots: Array, degree: int) -> Array:
     if degree == 1:
         # All the bend is at the grid points, as jumps of the slope.
         slopes = np.diff(identity, axis=0) / np.diff(grid)[:, None]
-        return half_width * np.diff(slopes, axis=0)
+        return np.asarray(half_width * np.diff(slopes, axis=0))
     nodes, weights = np.polynomial.legendre.leggauss(degree)
     middles, halves = 0.5 * (grid[1:] + grid[:-1]), 0.5 * np.diff(grid)
     points = (middles[:, None] + halves[:, None] * nodes).ravel()

@@ -1,7 +1,7 @@
 """Levenberg-Marquardt for fits of few parameters to many samples.
 
 SciPy's MINPACK does not give the same bits twice for the same problem, and small differences grow
-over a thousand steps; this one does, and is quicker on thousands of rows.
+over a thousand steps; this one does.
 """
 
 from __future__ import annotations
@@ -28,26 +28,36 @@ def descended(
     """
     values, left = start, residuals(start)
     square, damping = float(np.sum(left**2)), _FIRST_DAMPING
-    normal = _normal_equations(slopes(values), left)
-    damping *= float(np.trace(normal[:-1, :-1])) / len(start)
+    triangle = _triangle(slopes(values), left)
     for _ in range(steps):
         if damping > _LARGEST_DAMPING:
             break
-        damped = normal[:-1, :-1] + damping * np.eye(len(values))
-        tried = values - np.linalg.solve(damped, normal[:-1, -1])
+        tried = values - _step(triangle, damping)
         left = residuals(tried)
         tried_square = float(np.sum(left**2))
         # Not a number counts as a failure.
         if tried_square < square:
             values, square = tried, tried_square
             damping = max(_SMALLER * damping, _SMALLEST_DAMPING)
-            normal = _normal_equations(slopes(values), left)
+            triangle = _triangle(slopes(values), left)
         else:
             damping *= _LARGER
     return values
 
 
-def _normal_equations(slopes: Array, left: Array) -> Array:
-    """J'J with J'r as its last column; one symmetric product, whose bits do not vary."""
-    both = np.column_stack([slopes, left])
-    return both.T @ both
+def _triangle(slopes: Array, left: Array) -> Array:
+    """R of the slopes' QR decomposition with Q'r as its last column.
+
+    The normal equations would lose the flat directions, along which such fits go on for long.
+    """
+    triangle: Array = np.linalg.qr(np.column_stack([slopes, left]), mode="r")
+    return triangle
+
+
+def _step(triangle: Array, damping: float) -> Array:
+    """Least-squares solution of the linearised problem with damping added."""
+    count = triangle.shape[1] - 1
+    damped = np.vstack([triangle[:, :-1], np.sqrt(damping) * np.eye(count)])
+    wanted = np.concatenate([triangle[:, -1], np.zeros(count)])
+    step: Array = np.linalg.lstsq(damped, wanted, rcond=None)[0]
+    return step
