@@ -53,14 +53,16 @@ def bounds_for_recording(
 ) -> ErrorBounds:
     """Bounds for a network trained on measurements; `held_out` are rows in time order.
 
-    InputError when they are too few for the confidence.
+    The smooth fit of a recording may err more where it was fitted than on a quiet rest of it, so
+    the largest error is that of both parts. InputError when the rows are too few.
     """
     error_K = _errors_K(network, held_out)
+    largest_K = max(np.abs(error_K).max(), np.abs(_errors_K(network, training)).max())
     return ErrorBounds(
         theorem_bound(network, training, seed),
         None,
         over_blocks(error_K, confidence),
-        float(np.abs(error_K).max()),
+        float(largest_K),
     )
 
 

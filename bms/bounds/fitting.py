@@ -36,7 +36,7 @@ def fitted(layers: Layers, points: Points) -> Layers:
     for _ in range(_MOST_STEPS):
         slopes = jacobian(layers, points.x)
         curvature, gradient = slopes @ slopes.T, slopes @ error
-        unit = np.trace(curvature) / len(curvature) * np.eye(len(curvature))
+        unit = np.diag(np.diag(curvature) + _LEAST_DAMPING * np.trace(curvature))
         before = float(error @ error)
         while damping < _MOST_DAMPING:
             step = np.linalg.solve(curvature + damping * unit, gradient)

@@ -100,8 +100,9 @@ class ErrorBounds:
 
     The largest of the worst case and of every held-out error is used: it leaves out nothing that is
     known. Without a cell model to search, as for measured data, it is the larger of the conformal
-    bound and the largest held-out error. The theorem speaks of the distance between static maps,
-    not of what no static map can see, so that it cannot serve alone.
+    bound and the largest error, of which `held_out_K` then is that of the whole recording. The
+    theorem speaks of the distance between static maps, not of what no static map can see, so that
+    it cannot serve alone.
     """
 
     theorem: TheoremBound

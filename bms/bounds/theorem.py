@@ -2,9 +2,10 @@
 
 The theorem is about a composition h of smooth functions. Of data with a floor that no static map
 can pass, the best such h is approached by a network whose every edge is one polynomial; networks of
-G intervals are then fitted to it, each from the next coarser one, over data and box alike. Their
-distance to h falls as M G^-(k+1) where G is fine enough to follow h; the distance of h to the
-data, the floor, does not fall at all. Source: paper, theorem 1.
+G intervals are then fitted to it, each from the next coarser one, over data and box alike (where
+the box leads to hidden values that the data reach). Their distance to h falls as M G^-(k+1) where
+G is fine enough to follow h; the distance of h to the data, the floor, does not fall at all.
+Source: paper, theorem 1.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ _SMOOTH_ORDERS_BEYOND = 5
 _FITTED, _MEASURED = 2**11, 2**14
 _FIRST_MARGIN, _HIDDEN_MARGIN = 0.2, 0.05
 _PROBES = 40
+_AT_ENDS = 2**6
 
 Spans = list[list[tuple[float, float]]]
 SplineParts = Callable[[int, Array], Array]
@@ -43,7 +45,7 @@ def theorem_bound(network: Network, data: Samples, seed: int) -> TheoremBound:
         smooth, _spans(smooth, points.x, 0.0), rng.uniform(-1.0, 1.0, (len(points.x), _MEASURED))
     )
     on_data, on_box = forward(smooth, points.x)[0], forward(smooth, box)[0]
-    mixed = np.hstack([points.x[:, :_FITTED], box[:, :_FITTED]])
+    mixed = np.hstack([_chosen(smooth, points.x), _chosen(smooth, box)])
     target = Points(mixed, forward(smooth, mixed)[0])
 
     found: dict[int, Layers] = {}
@@ -136,6 +138,16 @@ def _smooth(network: Network, points: Points) -> Layers:
     smooth = _regridded(own, 1, order, _spans(own, points.x, _FIRST_MARGIN))
     smooth = fitted(smooth, points)
     return fitted(_regridded(smooth, 1, order, _spans(smooth, points.x, _HIDDEN_MARGIN)), points)
+
+
+def _chosen(layers: Layers, x: Array) -> Array:
+    """The first columns of x, and those at either end of every hidden node's range."""
+    ends = [
+        np.concatenate([order[:_AT_ENDS], order[-_AT_ENDS:]])
+        for nodes in _hidden(layers, x)
+        for order in np.argsort(nodes, axis=1)
+    ]
+    return x[:, np.unique(np.concatenate([np.arange(min(_FITTED, x.shape[1])), *ends]))]
 
 
 def _as_layers(network: Network) -> Layers:

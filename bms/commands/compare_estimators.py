@@ -19,6 +19,7 @@ from bms.commands.options import DataOption
 from bms.errors import InputError
 from bms.files import write_text
 from bms.kan.model_file import load_model, load_shipped_model, shipped_model_path
+from bms.kan.network import INPUT_NAMES
 from bms.presets import Preset, load_preset
 
 if TYPE_CHECKING:
@@ -131,6 +132,8 @@ def _models(preset: Preset | None, paths: list[Path]) -> list[NamedModel]:
         models.append(NamedModel("KAN", load_shipped_model(preset.name)))
     for path in paths:
         loaded = load_model(path)
+        if loaded.network.input_names[: len(INPUT_NAMES)] != INPUT_NAMES:
+            raise InputError(f"{path}: input_names: must begin with {', '.join(INPUT_NAMES)}")
         kind = "lagged KAN" if loaded.network.lags else "KAN"
         models.append(NamedModel(f"{kind} ({path.stem})", loaded))
     names = [name for name, _ in models]
@@ -214,7 +217,7 @@ def _print(comparison: Comparison, quick: bool) -> None:
         table.add_column(heading, justify="right", no_wrap=True)
     for row in comparison.rows:
         if not row.errors:
-            table.add_row(row.name, row.remark)
+            table.add_row(row.name)
             continue
         cost, read_K, time_ns = row.cost, row.read_rmse_K, row.time_per_estimate_ns
         table.add_row(
@@ -231,3 +234,6 @@ def _print(comparison: Comparison, quick: bool) -> None:
     # Lines longer than the terminal are better than figures cut off.
     console.width = max(console.width, _TABLE_WIDTH)
     console.print(table)
+    for row in comparison.rows:
+        if row.remark:
+            typer.echo(f"{row.name}: {row.remark}")

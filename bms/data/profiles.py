@@ -85,7 +85,7 @@ def draw_profiles(preset: Preset, kind: Kind, count: int, rng: np.random.Generat
 
 
 def start_range_K(preset: Preset) -> tuple[float, float]:
-    """Temperatures from which profiles begin, so far within the box that they stay in it a while."""
+    """Temperatures from which profiles begin, well within the box."""
     low_K, high_K = preset.operating_box.surface_temperature_K
     return low_K + _COLDEST_START_ABOVE_BOX_K, high_K - _WARMEST_START_BELOW_BOX_K
 

@@ -1,4 +1,4 @@
-"""Error figures of an estimate, and the error bound that the controller reckons with."""
+"""Error figures of an estimate, and what errors of the readings add to them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,6 @@ from bms.kan.basis import Array
 from bms.kan.model_file import ErrorFigures
 from bms.kan.network import INPUT_NAMES, Network
 from bms.presets.schema import Sensors
-
-ARITHMETIC_K = 1e-3
-"""Allowance for float32 and the firmware's tables; tests hold the C code to it."""
 
 
 def error_figures(estimate_K: Array, truth_K: Array) -> ErrorFigures:

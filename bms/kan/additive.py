@@ -41,8 +41,8 @@ def additive_layers(
 ) -> list[TrainableLayer]:
     """Layers of a network [n, 1, 1] for normalised inputs x (n, N) and target (N,).
 
-    The inputs' functions span -reach..reach, and the outer one what they can add up to there; `roughness` weighs their squared curvature against
-    the mean squared error.
+    The inputs' functions span -reach..reach, and the outer one what they can add up to there;
+    `roughness` weighs their squared curvature against the mean squared error.
     """
     span = (-reach, reach)
     inner = [_spline(np.clip(row, *span), span, settings) for row in x]

@@ -96,7 +96,7 @@ def model_for_measurements(path: Path, settings: TrainingSettings, progress: Pro
     """Model trained on the first two thirds of a recording and tested on the last third.
 
     The box spans the first two thirds and a tenth of their half range on either side. The error
-    bound is that of the last third; the noise of the sensors is part of it already.
+    bound covers all of it; the noise of the sensors is part of it already.
     Raises InputError when the file cannot be used or is too short.
     """
     recording = read_measurements(path).samples(settings.lags)

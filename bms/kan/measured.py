@@ -25,8 +25,8 @@ REACH = 1.5
 """Straight functions may go on beyond the trained box; what they give there is flagged."""
 
 _STRETCHES = 8
-_ROUGHNESS = tuple(10.0 ** np.arange(-6.0, 2.0))
-_TOLERATED = 1.1
+_ROUGHNESS = tuple(10.0 ** np.arange(-6.0, 2.0, 0.5))
+_TOLERATED = 1.05
 
 
 def train_on_recording(
@@ -37,7 +37,7 @@ def train_on_recording(
 ) -> Network:
     """Network fitted to one recording whose inputs lie within `ranges`.
 
-    With one hidden node it is the smoothest additive fit whose error is within 10 % of the best;
+    With one hidden node it is the smoothest additive fit whose error is within 5 % of the best;
     other widths are trained as on simulated data. Raises InputError when the width does not fit.
     """
     if not settings.has_one_hidden_node:

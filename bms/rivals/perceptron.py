@@ -5,18 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from bms.data.simulate import Samples
 from bms.kan.basis import Array
 from bms.rivals._rivals import ffi, lib
 from bms.rivals.effort import Effort
 from bms.rivals.estimator import BASE_COLUMNS, FLOAT32_BYTES, Cost, Rows, Starts
-from bms.rivals.levenberg_marquardt import descended
 from bms.rivals.native_array import filled, float_array, pointer
 from bms.rivals.scaling import Scaling
 
 _INPUTS = len(BASE_COLUMNS)
 _ROWS = 2**13
+_TOLERANCE = 1e-12
+_PULL = 1e-6
 
 
 def hidden_nodes(parameters: int) -> int:
@@ -45,7 +47,7 @@ class Perceptron:
 
     def values(self, x: Array) -> Array:
         """y (N,) for scaled inputs x (N, 4)."""
-        y: Array = (self._nodes(x) * self.output).sum(axis=1) + self.offset
+        y: Array = self._nodes(x) @ self.output + self.offset
         return y
 
     def slopes(self, x: Array) -> Array:
@@ -57,9 +59,7 @@ class Perceptron:
         return np.hstack([hidden.reshape(len(x), -1), one, nodes])
 
     def _nodes(self, x: Array) -> Array:
-        # No matrix product: its last bits depend on where the arrays lie, and so would the fit.
-        products = (x[:, column, None] * self.hidden[:, column] for column in range(_INPUTS))
-        nodes: Array = np.tanh(sum(products, start=self.bias))
+        nodes: Array = np.tanh(x @ self.hidden.T + self.bias)
         return nodes
 
 
@@ -127,20 +127,30 @@ def _trained(
     rows = rng.permutation(len(training.inputs))[:_ROWS]
     x, wanted = scaling.of_inputs(training.inputs)[rows], scaling.output(training)[rows]
     known_x, known = scaling.of_inputs(validation.inputs), scaling.output(validation)
+    count = nodes * (_INPUTS + 2) + 1
+    # Where a channel does not vary its weights would be free, and MINPACK's answer not repeatable.
+    pull = _PULL * np.eye(count)
+
+    def descended(weights: Array, steps: int) -> Array:
+        found: Array = least_squares(
+            lambda w: np.append(Perceptron.of(w, nodes).values(x) - wanted, pull @ w),
+            weights,
+            lambda w: np.vstack([Perceptron.of(w, nodes).slopes(x), pull]),
+            method="lm",
+            ftol=_TOLERANCE,
+            xtol=_TOLERANCE,
+            gtol=_TOLERANCE,
+            max_nfev=steps,
+        ).x
+        return found
 
     def mean_square(weights: Array) -> float:
         return float(np.mean((Perceptron.of(weights, nodes).values(known_x) - known) ** 2))
 
-    count = nodes * (_INPUTS + 2) + 1
     candidates = []
     for _ in range(effort.perceptron_starts):
         weights = 0.5 * rng.standard_normal(count)
         for steps in effort.perceptron_steps:
-            weights = descended(
-                lambda w: Perceptron.of(w, nodes).values(x) - wanted,
-                lambda w: Perceptron.of(w, nodes).slopes(x),
-                weights,
-                steps,
-            )
+            weights = descended(weights, steps)
             candidates.append(weights)
     return min(candidates, key=mean_square)

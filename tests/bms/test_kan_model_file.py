@@ -6,6 +6,14 @@ import math
 
 import pytest
 
+from bms.bounds.record import (
+    Conformal,
+    ErrorBounds,
+    Rate,
+    TheoremBound,
+    WorstCase,
+    WorstProfile,
+)
 from bms.errors import InputError
 from bms.kan.model_file import (
     ErrorFigures,
@@ -32,7 +40,31 @@ def model():
         TrainingRecord(TrainingSettings(), "simulated", None, {"test": 1}),
         {"test": SplitErrors(figures, figures, None)},
         0.4,
-        {"held_out_profiles": 0.3, "sensors": 0.1},
+        {"estimate": 0.3, "sensors": 0.1},
+        ErrorBounds(
+            TheoremBound(
+                (1, 2, 4),
+                (4.0, 0.25, 0.02),
+                (0.4, 0.02, 0.002),
+                4,
+                Rate(1, 4, 5.0, 3.9),
+                2,
+                0.3,
+                0.2,
+                0.01,
+            ),
+            WorstCase(
+                0.3,
+                0.3,
+                0.2,
+                WorstProfile(300.0, 0.1, 0.5, None, (-23.0, 0.0), (9.0, 5.0)),
+                10.0,
+                100,
+            ),
+            Conformal(0.15, 0.95, 20, "profile"),
+            0.28,
+        ),
+        (1e-7, 2e-7),
     )
 
 
@@ -73,6 +105,14 @@ def test_hash_changes_with_the_last_bit_of_one_coefficient(model):
         (lambda c: c["network"]["input_half_range"].__setitem__(0, 0.0), "input_half_range.0"),
         (lambda c: c["error_bound_parts_K"].update(sensors=0.0), "error_bound_K"),
         (lambda c: c["network"]["layers"][0][0].pop(), "layers"),
+        (lambda c: c["edge_error_bounds"].__setitem__(0, 1e-3), "hash"),
+        (lambda c: c["edge_error_bounds"].__setitem__(0, -1.0), "edge_error_bounds.0"),
+        (lambda c: c["error_bounds"]["worst_case"].update(value_K=0.29), "estimate"),
+        (lambda c: c["error_bounds"].update(held_out_K=0.31), "estimate"),
+        (lambda c: c["error_bounds"]["conformal"].update(confidence=1.0), "confidence"),
+        (lambda c: c["error_bounds"]["conformal"].update(value_K=0.2), "hash"),
+        (lambda c: c["error_bounds"]["theorem"]["rate"].update(constant_K=4.0), "hash"),
+        (lambda c: c.pop("error_bounds"), "train the model again with 'bms train'"),
     ],
 )
 def test_stale_or_malformed_file_is_refused_by_name_and_key(model, tmp_path, change, told):

@@ -18,7 +18,7 @@ from bms.presets import load_preset, preset_names
 from tests.bms.kan_samples import random_network, write_recording
 
 SHORT = TrainingSettings(epochs=6, batch=2000, refinement_steps=20)
-FEW = {"training": 6, "validation": 3, "test": 3}
+FEW = {"training": 6, "validation": 3, "test": 10}
 BOX = ((-24.0, 0.0), (0.0, 2.0), (280.0, 320.0), (280.0, 310.0))
 
 
@@ -61,16 +61,11 @@ def test_errors_in_the_model_are_those_of_its_network_on_the_splits(model):
             assert figures.max_abs_error_K == pytest.approx(np.max(np.abs(error)))
             assert figures.bias_K == pytest.approx(np.mean(error), abs=1e-12)
             assert figures.samples == len(error)
-    assert model.error_bound_parts_K["held_out_profiles"] == (
-        model.errors["test"].overall.max_abs_error_K
-    )
+    assert model.error_bounds is not None
+    assert model.error_bounds.held_out_K == model.errors["test"].overall.max_abs_error_K
+    assert model.error_bound_parts_K["estimate"] == model.error_bounds.used_K
     assert model.error_bound_K == pytest.approx(sum(model.error_bound_parts_K.values()))
-    assert set(model.error_bound_parts_K) == {
-        "held_out_profiles",
-        "full_steps_beyond",
-        "sensors",
-        "arithmetic",
-    }
+    assert set(model.error_bound_parts_K) == {"estimate", "search", "sensors", "arithmetic"}
 
 
 @pytest.mark.parametrize(

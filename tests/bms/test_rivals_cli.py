@@ -1,5 +1,6 @@
 """`bms compare-estimators` as a user calls it, and what it says about the figures."""
 
+import dataclasses
 import json
 import sys
 from pathlib import Path
@@ -9,7 +10,7 @@ import pytest
 
 from bms.cli import main
 from bms.data.measurements import COLUMNS, read_measurements
-from bms.kan.model_file import ErrorFigures, shipped_model_path
+from bms.kan.model_file import ErrorFigures, load_shipped_model, save_model, shipped_model_path
 from bms.presets import DEFAULT_PRESET
 from bms.rivals.comparison import Comparison, Row, Trace
 from bms.rivals.estimator import Cost
@@ -145,13 +146,28 @@ def test_network_of_another_cell_is_shown_with_a_warning(bms, recording):
     assert f"KAN ({DEFAULT_PRESET}) was not trained on charge.csv" in err
 
 
+def test_network_with_other_inputs_is_refused(bms, tmp_path):
+    loaded = load_shipped_model("lin2014")
+    network = dataclasses.replace(loaded.network, input_names=("a", "b", "c", "d"))
+    save_model(dataclasses.replace(loaded, network=network), tmp_path / "other.json")
+
+    code, _, err = bms(
+        "compare-estimators", "--preset", "lin2014", "--model", tmp_path / "other.json"
+    )
+
+    assert code == 2
+    assert "other.json: input_names: must begin with current_A" in err
+
+
 def test_without_scikit_learn_the_floor_says_why_it_is_missing(bms, monkeypatch, recording):
     monkeypatch.setitem(sys.modules, "sklearn.ensemble", None)
 
-    code, out, _ = bms("compare-estimators", "--data", recording, "--quick", "--json")
+    command = ("compare-estimators", "--data", recording, "--cell", "lin2014", "--quick")
+    code, out, _ = bms(*command, "--json")
 
     floor = by_name(json.loads(out), "floor")
     assert code == 0
+    assert "floor: not run: scikit-learn is not installed" in bms(*command)[1]
     assert floor["errors"] == {}
     assert floor["remark"].startswith("not run: scikit-learn is not installed")
 

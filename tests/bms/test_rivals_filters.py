@@ -56,7 +56,7 @@ def start_covariance():
 def linear_filter(inputs, steady):
     state, covariance = np.full(2, inputs[0, 2]), start_covariance()
     if steady:
-        for _ in range(20000):
+        for _ in range(2000):
             gain = corrected(state, covariance, 0.0)[2]
             covariance = F @ corrected(state, covariance, 0.0)[1] @ F.T + Q
     cores_K = [state[0]]
