@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -14,6 +15,7 @@ from hypothesis import settings
 settings.register_profile("no_deadline", deadline=None)
 settings.load_profile("no_deadline")
 
+Command = Callable[..., tuple[int, str, str]]
 EXTENSION = "bms.firmware._firmware"
 
 
@@ -37,6 +39,20 @@ def pytest_configure(config: pytest.Config) -> None:
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
     sys.modules[EXTENSION] = module
+
+
+@pytest.fixture
+def bms(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
+    """Calls the command line; gives exit code, stdout and stderr."""
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["bms", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stop:
+            import_module("bms.cli").main()
+        captured = capsys.readouterr()
+        return int(stop.value.code or 0), captured.out, captured.err
+
+    return call
 
 
 def pytest_report_header() -> str:

@@ -77,7 +77,7 @@ def model_for_preset(
         settings.seed,
         FULL_EFFORT.scaled(counts["test"] / PROFILES_OF_EACH_KIND["test"]),
     )
-    return _model(
+    return finished_model(
         network,
         TrainingRecord(
             settings,
@@ -86,8 +86,8 @@ def model_for_preset(
             {split: 2 * counts[split] for split in splits},
         ),
         errors,
+        error_bound_parts_K(network, bounds, samples["test"], preset),
         bounds,
-        samples["test"],
         preset,
     )
 
@@ -105,7 +105,8 @@ def model_for_measurements(path: Path, settings: TrainingSettings, progress: Pro
         raise InputError(f"{path}: {rows} rows; training needs at least {_FEWEST_ROWS}")
     training, test = split_by_time(recording)
     network = train_on_recording(training, _box(training.inputs), settings, progress)
-    return _model(
+    bounds = bounds_for_recording(network, training, test, settings.seed)
+    return finished_model(
         network,
         TrainingRecord(
             settings,
@@ -117,8 +118,8 @@ def model_for_measurements(path: Path, settings: TrainingSettings, progress: Pro
             "training": SplitErrors(_figures(network, training)),
             "test": SplitErrors(_figures(network, test)),
         },
-        bounds_for_recording(network, training, test, settings.seed),
-        test,
+        error_bound_parts_K(network, bounds, test, None),
+        bounds,
         None,
     )
 
@@ -129,15 +130,15 @@ def split_by_time(recording: Samples) -> tuple[Samples, Samples]:
     return _rows(recording, slice(cut)), _rows(recording, slice(cut, None))
 
 
-def _model(
+def finished_model(
     network: Network,
     record: TrainingRecord,
     errors: dict[str, SplitErrors],
-    bounds: ErrorBounds,
-    held_out: Samples,
+    parts_K: dict[str, float],
+    bounds: ErrorBounds | None,
     preset: Preset | None,
 ) -> KanModel:
-    parts_K = error_bound_parts_K(network, bounds, held_out, preset)
+    """A model with e_max, the sum of `parts_K`, and the bounds of its tables."""
     return KanModel(
         FORMAT_VERSION,
         network,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from pathlib import Path
 
 from bms.bounds.derive import bounds_for_preset, bounds_for_recording, error_bound_parts_K
@@ -12,8 +11,8 @@ from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
 from bms.data.simulate import Samples, joined
 from bms.kan.accuracy import error_figures
+from bms.kan.build import finished_model
 from bms.kan.model_file import (
-    FORMAT_VERSION,
     ErrorFigures,
     KanModel,
     SplitErrors,
@@ -23,7 +22,6 @@ from bms.kan.network import INPUT_NAMES, Network
 from bms.kan.settings import TrainingSettings
 from bms.presets import Preset
 from bms.pykan_import.checkpoint import Checkpoint
-from bms.tables.rounding import edge_error_bounds, fits_firmware
 
 UNKNOWN_ERROR_K = 1000.0
 """Bound of a network that is no estimator of the four inputs: too wide for any current."""
@@ -83,23 +81,13 @@ def _model(
     bounds: ErrorBounds | None = None,
     preset: Preset | None = None,
 ) -> KanModel:
-    return KanModel(
-        FORMAT_VERSION,
-        network,
-        None if preset is None else preset.name,
-        None if preset is None else preset.training_hash,
-        TrainingRecord(
-            _settings(checkpoint, network),
-            f"imported from pykan checkpoint {checkpoint.name}, {tested}",
-            checkpoint.state_sha256,
-            {},
-        ),
-        errors,
-        math.fsum(parts_K.values()),
-        parts_K,
-        bounds,
-        edge_error_bounds(network) if fits_firmware(network) else (),
+    record = TrainingRecord(
+        _settings(checkpoint, network),
+        f"imported from pykan checkpoint {checkpoint.name}, {tested}",
+        checkpoint.state_sha256,
+        {},
     )
+    return finished_model(network, record, errors, parts_K, bounds, preset)
 
 
 def _figures(network: Network, samples: Samples) -> ErrorFigures:

@@ -2,14 +2,12 @@
 
 import json
 import math
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from bms.bounds.derive import SEARCH_SPREAD_K, bounds_for_recording, error_bound_parts_K
-from bms.cli import main
 from bms.data.measurements import read_measurements
 from bms.kan.build import split_by_time
 from bms.kan.model_file import load_model, load_shipped_model, save_model, shipped_model_path
@@ -17,20 +15,6 @@ from bms.presets import preset_names
 from tests.bms.kan_samples import write_recording
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
-
-
-@pytest.fixture
-def bms(monkeypatch, capsys):
-    """Calls the command line; gives exit code, stdout and stderr."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["bms", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        captured = capsys.readouterr()
-        return stop.value.code, captured.out, captured.err
-
-    return call
 
 
 @pytest.fixture(scope="module")

@@ -2,13 +2,11 @@
 
 import dataclasses
 import json
-import sys
 
 import numpy as np
 import pytest
 from matplotlib.mathtext import MathTextParser
 
-from bms.cli import main
 from bms.data.datasets import simulated_split
 from bms.data.simulate import joined
 from bms.explanation import explain
@@ -224,20 +222,6 @@ def test_latex_of_every_formula_can_be_set():
     assert all(ord(letter) < 128 for letter in document)
     assert "I2lag_10s" in as_text(subject, explanation)
     assert "dTslag_2_5s" in as_text(subject, explanation)
-
-
-@pytest.fixture
-def bms(monkeypatch, capsys):
-    """Calls the command line; gives exit code, stdout and stderr."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["bms", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        captured = capsys.readouterr()
-        return stop.value.code, captured.out, captured.err
-
-    return call
 
 
 def test_command_writes_the_same_files_each_time(bms, tmp_path):

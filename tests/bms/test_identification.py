@@ -2,14 +2,12 @@
 
 import dataclasses
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bms.cell import CellState, integrate_step
-from bms.cli import main
 from bms.data.measurements import COLUMNS, Measurements, read_measurements
 from bms.errors import InputError
 from bms.identification import identify
@@ -206,20 +204,6 @@ def test_measured_drive_cycle():
     assert result.held_out.core_rmse_K < 0.92
     assert result.held_out.surface_rmse_K < 0.57
     assert 0.008 < result.cell.ohmic_resistance_ohm < 0.0241
-
-
-@pytest.fixture
-def bms(monkeypatch, capsys):
-    """Calls the command line; gives exit code, stdout and stderr."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["bms", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        captured = capsys.readouterr()
-        return stop.value.code, captured.out, captured.err
-
-    return call
 
 
 @pytest.fixture(scope="module")

@@ -4,13 +4,11 @@ import dataclasses
 import json
 import pickle
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from bms.cli import main
 from bms.errors import InputError, ModelMismatchError
 from bms.firmware import CompiledNetwork, Firmware
 from bms.kan.model_file import load_model, load_shipped_model
@@ -275,20 +273,6 @@ def test_network_of_other_inputs_has_a_bound_that_the_ecu_refuses(tmp_path):
     assert model.error_bound_K == UNKNOWN_ERROR_K
     with pytest.raises(ModelMismatchError, match="inputs"):
         Firmware(preset, model)
-
-
-@pytest.fixture
-def bms(monkeypatch, capsys):
-    """Calls the command line; gives exit code, stdout and stderr."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["bms", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        captured = capsys.readouterr()
-        return stop.value.code, captured.out, captured.err
-
-    return call
 
 
 def test_command_scales_inputs_and_output_and_tests_on_a_recording(bms, tmp_path):

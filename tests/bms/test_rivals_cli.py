@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bms.cli import main
 from bms.data.measurements import COLUMNS, read_measurements
 from bms.kan.model_file import ErrorFigures, load_shipped_model, save_model, shipped_model_path
 from bms.presets import DEFAULT_PRESET
@@ -23,20 +22,6 @@ KEYS = {
 }  # fmt: skip
 MEASURED = Path(__file__).parents[3] / "shared" / "data" / "a123_26650_hev_cycle_1.csv"
 QUICK = ["--quick", "--profiles", 1]
-
-
-@pytest.fixture
-def bms(monkeypatch, capsys):
-    """Calls the command line; gives exit code, stdout and stderr."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["bms", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        captured = capsys.readouterr()
-        return stop.value.code, captured.out, captured.err
-
-    return call
 
 
 @pytest.fixture

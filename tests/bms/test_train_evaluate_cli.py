@@ -2,12 +2,10 @@
 
 import json
 import math
-import sys
 
 import numpy as np
 import pytest
 
-from bms.cli import main
 from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
 from bms.data.profiles import draw_profiles
@@ -19,20 +17,6 @@ from tests.bms.kan_samples import write_recording
 
 KEYS = {"rmse_K", "max_abs_error_K", "bias_K", "samples", "extrapolated_samples"}
 QUICK = ["--epochs", "3", "--refinement-steps", "20"]
-
-
-@pytest.fixture
-def bms(monkeypatch, capsys):
-    """Calls the command line; gives exit code, stdout and stderr."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["bms", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        captured = capsys.readouterr()
-        return stop.value.code, captured.out, captured.err
-
-    return call
 
 
 @pytest.fixture(scope="module")

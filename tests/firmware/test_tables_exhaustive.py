@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +13,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bms.cli import main
 from bms.firmware import CompiledNetwork
 from bms.firmware.edges import CompiledEdges
 from bms.kan.model_file import load_model, save_model, shipped_models
@@ -28,20 +26,6 @@ STRIDE = 8191
 SHAPES = st.sampled_from(
     [((4, 1, 1), 2, 3), ((4, 2, 1), 5, 3), ((4, 1), 7, 2), ((4, 2, 2, 1), 2, 4)]
 )
-
-
-@pytest.fixture
-def bms(monkeypatch, capsys):
-    """Calls the command line; gives exit code, stdout and stderr."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["bms", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        captured = capsys.readouterr()
-        return stop.value.code, captured.out, captured.err
-
-    return call
 
 
 def nudged(network: Network, number: int, change: float) -> Network:
@@ -162,7 +146,7 @@ def test_runs_of_neighbouring_arguments_hold(path, first):
 
 
 @given(shape=SHAPES, seed=st.integers(0, 10_000))
-@settings(max_examples=15)
+@settings(max_examples=5)
 def test_bounds_of_any_network_hold(shape, seed):
     network = random_model(*shape, seed=seed).network
 
@@ -174,7 +158,7 @@ def test_bounds_of_any_network_hold(shape, seed):
 
 
 @given(shape=SHAPES, seed=st.integers(0, 10_000))
-@settings(max_examples=15)
+@settings(max_examples=5)
 def test_bound_of_the_whole_estimate_holds_for_any_network(shape, seed):
     model = random_model(*shape, seed=seed)
     points = box_points(model.network, 4000, seed)
