@@ -8,13 +8,14 @@ export OPENBLAS_NUM_THREADS ?= 1
 BIN := .venv/bin
 RUNNER := hil_sim/campaign/native
 RIVALS := bms/rivals/native
+C_PROGRAMS := tests/firmware/native
 SOURCES := $(wildcard firmware_c/*/*.[ch] $(RUNNER)/*.[ch] $(RIVALS)/*.[ch]) \
   bms/firmware/build.py bms/rivals/build.py hil_sim/campaign/build.py setup.py
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 C_WARNINGS := -std=c99 -pedantic -Wall -Wextra -Werror -Wconversion -Wdouble-promotion -Wmissing-prototypes
 C_INCLUDES := -Ifirmware_c/include -Ifirmware_c/src -Ifirmware_c/generated
 
-.PHONY: help run test lint generate models verify-tables clean
+.PHONY: help run test lint generate models verify-tables fuzz benchmark clean
 .DEFAULT_GOAL := help
 
 help: ## List the targets
@@ -31,8 +32,8 @@ lint: .venv/tests ## Types, style and C warnings
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	for source in firmware_c/src/*.c firmware_c/generated/*.c $(RUNNER)/*.c $(RIVALS)/*.c; do \
-	  $(CC) $(C_WARNINGS) $(C_INCLUDES) -I$(RUNNER) -I$(RIVALS) -fsyntax-only $$source || exit 1; done
+	for source in firmware_c/src/*.c firmware_c/generated/*.c $(RUNNER)/*.c $(RIVALS)/*.c $(C_PROGRAMS)/*.c; do \
+	  $(CC) $(C_WARNINGS) $(C_INCLUDES) -I$(RUNNER) -I$(RIVALS) -I$(C_PROGRAMS) -fsyntax-only $$source || exit 1; done
 
 generate: .venv/runtime ## Write firmware_c/generated anew from preset, model and CAN database
 	$(BIN)/python -m codegen
@@ -45,6 +46,14 @@ models: .venv/runtime ## Train the shipped models anew (both presets, lagged too
 
 verify-tables: .venv/runtime ## Try all 2^32 arguments of every edge of the shipped models in C (some 15 minutes)
 	$(BIN)/bms verify-tables --stride 1
+
+fuzz: .venv/tests ## 10^7 random and damaged frames through the ECU with sanitizers; SEED=n for others
+	$(BIN)/python -m tests.firmware.native.build fuzz --sanitize --out build/native
+	build/native/fuzz 10000000 $(or $(SEED),1)
+
+benchmark: .venv/tests ## Time of a control period of the ECU in C, and what dominates it
+	$(BIN)/python -m tests.firmware.native.build benchmark --out build/native
+	build/native/benchmark 50000
 
 clean: ## Remove everything that set-up, build and runs have made
 	rm -rf .venv build out *.egg-info bms/firmware/_firmware.* bms/rivals/_rivals.* hil_sim/campaign/_runner.*

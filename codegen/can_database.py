@@ -7,7 +7,9 @@ from importlib.resources import files
 import cantools
 from cantools.database.can import Database, Message
 
-E2E_ATTRIBUTE = "E2EProfile2DataIdList"
+CYCLE_ATTRIBUTE = "GenMsgCycleTime"
+TIMEOUT_ATTRIBUTE = "MessageTimeoutTime"
+DATA_IDS_ATTRIBUTE = "E2EProfile2DataIdList"
 ECU, PLANT = "ECU", "PLANT"
 
 
@@ -23,8 +25,17 @@ def load_database() -> Database:
     return database
 
 
+def number_attribute(database: Database, message: Message, name: str) -> int:
+    """Value of a message's attribute, or the database's default."""
+    assert message.dbc is not None and database.dbc is not None
+    own = message.dbc.attributes.get(name)
+    value = own.value if own else database.dbc.attribute_definitions[name].default_value
+    assert isinstance(value, int)
+    return value
+
+
 def data_ids(message: Message) -> bytes:
     """The 16 data ids of AUTOSAR E2E profile 2; empty for an unprotected message."""
     attributes = message.dbc.attributes if message.dbc else {}
-    attribute = attributes.get(E2E_ATTRIBUTE)
-    return bytes.fromhex(str(attribute.value)) if attribute else b""
+    own = attributes.get(DATA_IDS_ATTRIBUTE)
+    return bytes.fromhex(str(own.value)) if own else b""

@@ -9,7 +9,15 @@ from typing import Any
 from cantools.database.can import Database, Message, Signal
 from cantools.database.can.c_source import camel_to_snake_case, generate
 
-from codegen.can_database import ECU, PLANT, data_ids, database_text, load_database
+from codegen.can_database import (
+    CYCLE_ATTRIBUTE,
+    ECU,
+    PLANT,
+    data_ids,
+    database_text,
+    load_database,
+    number_attribute,
+)
 from codegen.rendering import environment, float_literal
 
 RESERVED_CODES = 2
@@ -44,7 +52,7 @@ def _catalogue(database: Database) -> dict[str, Any]:
         found = [m for m in database.messages if m.senders == [sender] and m.length > 0]
         # The charge command ends a period for whoever waits for it.
         found.sort(key=lambda m: (m.name == "ChargeCommand", m.frame_id))
-        return [_message(m) for m in found]
+        return [_message(database, m) for m in found]
 
     signals = [s for m in database.messages for s in m.signals if s.unit]
     return {
@@ -55,13 +63,25 @@ def _catalogue(database: Database) -> dict[str, Any]:
     }
 
 
-def _message(message: Message) -> dict[str, Any]:
-    literals = [f"0x{number:02X}u" for number in data_ids(message)]
+def _message(database: Database, message: Message) -> dict[str, Any]:
+    def number(name: str, of: Message = message) -> int:
+        return number_attribute(database, of, name)
+
+    # One SYNC a control period.
+    period_ms = number(CYCLE_ATTRIBUTE, database.get_message_by_name("SYNC"))
+    literals = [f"0x{data_id:02X}u" for data_id in data_ids(message)]
     return {
         "name": camel_to_snake_case(message.name).upper(),
         "id": message.frame_id,
         "length": message.length,
         "is_protected": int(bool(literals)),
+        "every_periods": number(CYCLE_ATTRIBUTE) // period_ms,
+        "max_delta_counter": number("E2EMaxDeltaCounter"),
+        "window_periods": number("E2EWindowSize"),
+        "limits": [
+            (number(f"E2EMinOkState{state}"), number(f"E2EMaxErrorState{state}"))
+            for state in ("Init", "Valid", "Invalid")
+        ],
         "data_id_rows": [", ".join(literals[i : i + 8]) for i in range(0, len(literals), 8)],
     }
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from bms.errors import BusError, ModelMismatchError
 from bms.presets import Preset
 from hil_sim.charger import Charger
+from hil_sim.faults import Injection
 from hil_sim.nodes.plant import NO_FAULT, Answer, PlantNode, Request
 from hil_sim.plant import Plant
 from hil_sim.result import (
@@ -41,14 +42,16 @@ class Identity:
 
 @dataclass
 class Charge:
-    """A charge from plug-in until full, fault, silence or time limit."""
+    """A charge from plug-in until full, fault, silence or time limit; else until the last alone."""
 
     preset: Preset
     node: PlantNode
     plant: Plant
     sensors: SensorSuite
     charger: Charger
+    injection: Injection
     max_time_s: float
+    ends_early: bool = True
     progress: Progress = lambda soc: None
 
     def __post_init__(self) -> None:
@@ -67,8 +70,11 @@ class Charge:
         Raises BusError when no ECU gets ready and ModelMismatchError when it has another preset.
         """
         while True:
+            self.injection.begin(self._charge_period, self.plant)
             answer = self.node.exchange(self.steps, self._measure(), self._request())
-            self.plant.current_A = self.charger.current_A(answer.command_A)
+            self.plant.current_A = self.injection.supplied_A(
+                self.charger.current_A(answer.command_A), self.plant.current_A
+            )
             self._note(answer)
             self.steps += 1
             reason = self._stop_reason(answer)
@@ -82,9 +88,13 @@ class Charge:
     def _period_s(self) -> float:
         return self.preset.timing.sampling_period_s
 
+    @property
+    def _charge_period(self) -> int | None:
+        return None if self._edge is None else self.steps - self._edge
+
     def _measure(self) -> Readings:
         plant = self.plant
-        return self.sensors.read(
+        healthy = self.sensors.read(
             Readings(
                 plant.current_A,
                 plant.voltage_V,
@@ -93,6 +103,7 @@ class Charge:
                 plant.cooling_power_W,
             )
         )
+        return self.injection.readings(healthy, plant.state)
 
     def _request(self) -> Request:
         reference_A = self.preset.limits.reference_current_A
@@ -132,11 +143,11 @@ class Charge:
     def _stop_reason(self, answer: Answer) -> str | None:
         if self._edge is None:
             return None
-        if self._silent_periods >= SILENT_PERIODS:
+        if self.ends_early and self._silent_periods >= SILENT_PERIODS:
             return STOP_SILENT
-        if answer.state == "complete":
+        if self.ends_early and answer.state == "complete":
             return STOP_COMPLETE
-        if answer.state == "fault":
+        if self.ends_early and answer.state == "fault":
             return STOP_FAULT
         if (self.steps - self._edge) * self._period_s >= self.max_time_s:
             return STOP_TIME_LIMIT

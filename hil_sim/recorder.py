@@ -1,35 +1,32 @@
-"""Recording of a run in the format of `candump -L`, with virtual time stamps."""
+"""Recording of a run with its time stamps, which are virtual unless it runs in real time."""
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 
-import can
-
 from hil_sim.bus import Frame
-
-CHANNEL = "vcan0"
-"""Name in the log whatever the bus was, so that equal runs give equal logs and canplayer plays."""
+from hil_sim.logs import LogFrame, LogWriter
 
 
 class Recorder:
-    """Writes frames to a log file; T marks those of the plant, R those of the ECU and others."""
+    """Writes frames to log files of the formats that their suffixes name.
 
-    def __init__(self, path: Path) -> None:
-        self._writer = can.CanutilsLogWriter(path, channel=CHANNEL)
+    Frames of the plant count as sent (T in a candump log), those of the ECU and others as received
+    (R). Raises InputError as LogWriter does.
+    """
+
+    def __init__(self, *paths: Path) -> None:
+        with ExitStack() as stack:
+            self._writers = [stack.enter_context(LogWriter(path)) for path in paths]
+            self._open = stack.pop_all()
 
     def record(self, time_s: float, frame: Frame, received: bool) -> None:
         """Append one frame at a time in s since the start of the run."""
-        self._writer.on_message_received(
-            can.Message(
-                timestamp=time_s,
-                arbitration_id=frame.frame_id,
-                data=frame.data,
-                is_extended_id=False,
-                is_rx=received,
-            )
-        )
+        entry = LogFrame(time_s, frame.frame_id, frame.data, received=received)
+        for writer in self._writers:
+            writer.write(entry)
 
     def __enter__(self) -> Recorder:
         return self
@@ -40,4 +37,4 @@ class Recorder:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._writer.stop()
+        self._open.close()

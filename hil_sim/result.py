@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from bms.cell import CellState
+from hil_sim.faults.injection import InjectedFault
 from hil_sim.nodes.plant import Answer
 
 
@@ -32,6 +33,7 @@ class TimeSeries:
     state: list[str | None] = field(default_factory=list)
     active_constraint: list[str | None] = field(default_factory=list)
     feasible: list[bool | None] = field(default_factory=list)
+    latched_faults: list[int | None] = field(default_factory=list)
 
     def append(
         self, time_s: float, state: CellState, current_A: float, voltage_V: float, answer: Answer
@@ -50,6 +52,8 @@ class TimeSeries:
         self.state.append(answer.state)
         self.active_constraint.append(answer.active_constraint)
         self.feasible.append(answer.feasible)
+        latched = answer.value("LatchedFaults")
+        self.latched_faults.append(None if latched is None else int(latched))
 
 
 @dataclass(frozen=True)
@@ -81,10 +85,12 @@ class Summary:
     realtime: bool
     model_hash: str | None
     preset_hash: str
+    faults: tuple[InjectedFault, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Plain mapping in the order of the fields."""
-        return {**asdict(self), "violations": list(self.violations)}
+        content = asdict(self)
+        return {**content, "violations": list(self.violations), "faults": list(content["faults"])}
 
     @property
     def failures(self) -> list[str]:

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
+from threading import Event, Thread
 
 import numpy as np
 
 from bms.baselines import BASELINES
+from bms.errors import InputError
 from bms.firmware import Ecu
+from bms.kan.model_file import KanModel
 from bms.presets import Preset
-from bms.presets.schema import Sensors
 from hil_sim.bus import CanBus, open_bus, require_shared
 from hil_sim.charge import Charge, Progress
 from hil_sim.charger import Charger
 from hil_sim.clock import WallClock
 from hil_sim.database import MessageCodec, load_database
 from hil_sim.disturbances import DisturbanceKind, disturbance_source
+from hil_sim.faults import Fault, Injection
 from hil_sim.nodes.ecu import EcuLike, EcuNode
 from hil_sim.nodes.plant import PlantNode
 from hil_sim.nodes.turns import LockStep, OnClock, PacedLockStep, Turn
@@ -53,16 +56,18 @@ class ControllerKind(str, Enum):
 
 
 EcuFactory = Callable[[Plant, "dict[str, MessageCodec]"], EcuLike]
-SensorFactory = Callable[[Sensors, np.random.Generator], SensorSuite]
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What determines a run. The delay is in control periods, the time limit from the edge."""
+    """What determines a run. The delay is in control periods, the time limit from the edge.
+
+    A run that does not end early goes on to the time limit whatever the ECU says.
+    """
 
     preset: Preset
     controller: ControllerKind = ControllerKind.KAN_RCBF
-    model: Path | None = None
+    model: Path | KanModel | None = None
     bus: str = "virtual:bms"
     seed: int = 0
     disturbance: DisturbanceKind = DisturbanceKind.NONE
@@ -70,6 +75,8 @@ class Settings:
     max_time_s: float = 3600.0
     realtime: bool = False
     answer_timeout_s: float = ANSWER_TIMEOUT_S
+    faults: tuple[Fault, ...] = ()
+    ends_early: bool = True
 
 
 def run_both(
@@ -77,18 +84,17 @@ def run_both(
     recorder: Recorder | None = None,
     progress: Progress = lambda soc: None,
     ecu_factory: EcuFactory | None = None,
-    sensor_factory: SensorFactory = SensorSuite,
 ) -> RunResult:
     """Plant and ECU in this process and thread, on two connections to one bus.
 
-    `ecu_factory` replaces the controller that the settings name, `sensor_factory` the sensors that
-    the preset describes. Raises InputError or BusError.
+    `ecu_factory` replaces the controller that the settings name. Raises InputError or BusError.
     """
     database = load_database()
+    injection = _injection(settings, database)
     with ExitStack() as stack:
         plant = _plant(settings)
         make = ecu_factory or _factory(settings)
-        ecu = make(plant, database)
+        ecu = injection.ecu(lambda: make(plant, database))
         ecu_bus = stack.enter_context(open_bus(settings.bus))
         plant_bus = stack.enter_context(open_bus(settings.bus))
         node = EcuNode(ecu_bus, ecu)
@@ -103,7 +109,41 @@ def run_both(
             turn = PacedLockStep(period_s, timeout_s, serve, WallClock())
         else:
             turn = LockStep(period_s, timeout_s, serve)
-        return _run(settings, plant, plant_bus, database, turn, recorder, progress, sensor_factory)
+        return _run(settings, plant, plant_bus, database, turn, injection, recorder, progress)
+
+
+def run_on_clocks(
+    settings: Settings, recorder: Recorder | None = None, progress: Progress = lambda soc: None
+) -> RunResult:
+    """Plant and firmware in this process, each in a thread and on a clock of its own, without SYNC.
+
+    Raises InputError or BusError.
+    """
+    database = load_database()
+    injection = _injection(settings, database)
+    plant = _plant(settings)
+    ecu = injection.ecu(lambda: _factory(settings)(plant, database))
+    period_s = settings.preset.timing.sampling_period_s
+    with (
+        open_bus(settings.bus) as ecu_bus,
+        open_bus(settings.bus) as plant_bus,
+        _running_on_clock(EcuNode(ecu_bus, ecu), period_s),
+    ):
+        turn = OnClock(period_s, WallClock())
+        return _run(settings, plant, plant_bus, database, turn, injection, recorder, progress)
+
+
+@contextmanager
+def _running_on_clock(node: EcuNode, period_s: float) -> Iterator[None]:
+    stop = Event()
+    arguments = (period_s, WallClock(), float("inf"), stop.is_set)
+    thread = Thread(target=node.run_on_clock, args=arguments, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
 
 
 def run_plant(
@@ -111,9 +151,17 @@ def run_plant(
 ) -> RunResult:
     """The plant alone, with an ECU on the bus in another process.
 
-    Raises InputError for a bus that no other process can be on, BusError when no ECU answers.
+    Raises InputError for a bus that no other process can be on and for faults inside the ECU,
+    BusError when no ECU answers.
     """
     require_shared(settings.bus)
+    for fault in settings.faults:
+        if fault.needs_own_ecu:
+            raise InputError(
+                f"fault '{fault.kind}': happens inside the ECU, which is another process; "
+                "use 'bms sil', or restart 'bms ecu'"
+            )
+    database = load_database()
     period_s = settings.preset.timing.sampling_period_s
     plant = _plant(settings)
     with open_bus(settings.bus) as bus:
@@ -122,18 +170,27 @@ def run_plant(
             turn = OnClock(period_s, WallClock())
         else:
             turn = LockStep(period_s, settings.answer_timeout_s)
-        return _run(settings, plant, bus, load_database(), turn, recorder, progress)
+        injection = _injection(settings, database)
+        return _run(settings, plant, bus, database, turn, injection, recorder, progress)
 
 
-def _generators(seed: int) -> list[np.random.Generator]:
-    """Independent random numbers for disturbance and sensors, so that one leaves the other."""
-    return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)]
+def _seeds(seed: int) -> list[np.random.SeedSequence]:
+    """Independent randomness for disturbance, sensors and faults, so that one leaves the others."""
+    return np.random.SeedSequence(seed).spawn(3)
+
+
+def _injection(settings: Settings, database: dict[str, MessageCodec]) -> Injection:
+    for fault in settings.faults:
+        if fault.needs_realtime and not settings.realtime:
+            raise InputError(f"fault '{fault.kind}': acts on the wall clock; add --realtime")
+    period_s = settings.preset.timing.sampling_period_s
+    return Injection(settings.faults, period_s, _seeds(settings.seed)[2], database)
 
 
 def _plant(settings: Settings) -> Plant:
     preset = settings.preset
     step_s = preset.timing.sampling_period_s / SUB_STEPS
-    rng, _ = _generators(settings.seed)
+    rng = np.random.default_rng(_seeds(settings.seed)[0])
     return Plant(preset, disturbance_source(settings.disturbance, preset, step_s, rng))
 
 
@@ -156,19 +213,20 @@ def _run(
     bus: CanBus,
     database: dict[str, MessageCodec],
     turn: Turn,
+    injection: Injection,
     recorder: Recorder | None,
     progress: Progress,
-    sensor_factory: SensorFactory = SensorSuite,
 ) -> RunResult:
     preset = settings.preset
-    _, sensor_rng = _generators(settings.seed)
     charge = Charge(
         preset=preset,
-        node=PlantNode(bus, database, turn, recorder),
+        node=PlantNode(bus, database, turn, recorder, injection.sent, injection.heard),
         plant=plant,
-        sensors=sensor_factory(preset.sensors, sensor_rng),
+        sensors=SensorSuite(preset.sensors, np.random.default_rng(_seeds(settings.seed)[1])),
         charger=Charger(preset, settings.charger_delay_periods),
+        injection=injection,
         max_time_s=settings.max_time_s,
+        ends_early=settings.ends_early,
         progress=progress,
     )
     start_s = time.perf_counter()
@@ -208,5 +266,6 @@ def _sum_up(settings: Settings, charge: Charge, reason: str, wall_time_s: float)
         realtime=settings.realtime,
         model_hash=charge.identity.model if charge.identity else None,
         preset_hash=settings.preset.hash,
+        faults=charge.injection.injected,
     )
     return RunResult(summary, series)

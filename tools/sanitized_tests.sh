@@ -5,4 +5,5 @@ set -eu
 runtime=$(${CC:-gcc} -print-file-name=libasan.so)
 LD_PRELOAD=$runtime ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
   .venv/bin/python -m pytest tests/firmware -n 2 --dist loadfile --firmware-build build/sanitized \
-  --ignore tests/firmware/test_mutants.py --ignore tests/firmware/test_structure.py "$@"
+  --ignore tests/firmware/test_mutants.py --ignore tests/firmware/test_structure.py \
+  --ignore tests/firmware/test_fuzz.py "$@"

@@ -12,12 +12,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from bms.barrier.margins import BusQuantisation
 from bms.cell import CellParameters
-from bms.kan.basis import Array
+from bms.errors import InputError
 from bms.presets.schema import Preset
 
+Array = npt.NDArray[np.float64]
 _BUS = BusQuantisation()
 
 
@@ -41,7 +43,8 @@ def surface_prediction(
     """Exact discretisation for the preset's period, inputs held, of the cell's two-mass model.
 
     The bound covers the preset's disturbances, the errors of the current, coolant and surface
-    sensors and of the bus, for a cell that was at rest when the prediction began.
+    sensors and of the bus, for a cell that was at rest when the prediction began. Raises InputError
+    for a cell that the entropic heat alone would run away with.
     """
     # Imported here, so that an ECU with the compiled-in constants starts without SciPy.
     from scipy.linalg import expm  # noqa: PLC0415
@@ -75,6 +78,11 @@ def _error_bound_K(cell: CellParameters, preset: Preset, bus: BusQuantisation) -
     )
     # The entropic heat depends on the core temperature, which heat and resistances set in turn.
     loop = entropic * current_A * (cell.core_resistance_K_per_W + cell.surface_resistance_K_per_W)
+    if loop >= 1.0:
+        raise InputError(
+            f"preset '{preset.name}': cell.entropic_coefficient_V_per_K: {entropic:g} V/K heats "
+            "more than the resistances carry away to the coolant; check it and the resistances"
+        )
     at_start_and_now = 2.0 * surface_error_K
     driven_K = cell.surface_resistance_K_per_W * heat_error_W + coolant_error_K
     return float((driven_K + at_start_and_now) / (1.0 - loop))

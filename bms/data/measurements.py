@@ -32,7 +32,7 @@ class Measurements:
         """The recording as samples of one profile, inputs in the estimator's order.
 
         Lagged inputs follow the four; the recording is taken to begin at rest, and the current of a
-        row to have flowed since the row before.
+        row to flow until the next one, as in simulated profiles.
         """
         inputs = np.stack(
             [
@@ -54,7 +54,9 @@ class Measurements:
         values = at_rest(lags, 1)
         rows = [values[:, 0]]
         changes_K = np.diff(self.surface_temperature_K)
-        for step_s, current_A, change_K in zip(np.diff(self.time_s), self.current_A[1:], changes_K):
+        for step_s, current_A, change_K in zip(
+            np.diff(self.time_s), self.current_A[:-1], changes_K
+        ):
             values = step(lags, values, float(step_s), float(current_A), float(change_K))
             rows.append(values[:, 0])
         return np.array(rows)

@@ -31,6 +31,15 @@ class Samples:
     profile: npt.NDArray[np.int64]
     time_s: Array
 
+    def rows(self, rows: slice) -> Samples:
+        """Some of the samples."""
+        return Samples(
+            self.inputs[rows],
+            self.core_temperature_K[rows],
+            self.profile[rows],
+            self.time_s[rows],
+        )
+
 
 def joined(parts: Iterable[Samples]) -> Samples:
     """All samples in one; profile numbers go on from part to part."""

@@ -48,7 +48,11 @@ def edge_slope(edge: Edge, x: Array, degree: int) -> Array:
 
 
 def sensitivities(network: Network, inputs: Array) -> Array:
-    """dThat/dx (N, n_in) in kelvin for each unit of the input, at inputs (N, n_in)."""
+    """dThat/dx (N, n_in) in kelvin for each unit of the input, at inputs (N, n_in).
+
+    0 where the input is beyond the network's reach.
+    """
+    half_range = np.asarray(network.input_half_range)
+    within = np.abs(inputs - np.asarray(network.input_center)) <= network.reach * half_range
     gains_K = node_gains_K(network, node_values(network, inputs))[0]
-    slopes: Array = gains_K / np.asarray(network.input_half_range)
-    return slopes
+    return np.where(within, gains_K / half_range, 0.0)

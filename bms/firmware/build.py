@@ -16,8 +16,8 @@ ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = Path("firmware_c")
 MODULE = "bms.firmware._firmware"
 HEADERS = (
-    *("kan", "rcbf", "thermal", "calibration", "can_frame", "codec", "e2e", "monitor", "soc"),
-    *("history", "bms"),
+    *("kan", "rcbf", "thermal", "calibration", "can_frame", "e2e", "codec", "monitor", "soc"),
+    *("history", "network", "bms"),
 )
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")

@@ -64,15 +64,16 @@ class CompiledNetwork:
         """
         core, in_domain = np.empty(len(recording.time_s)), np.empty(len(recording.time_s), np.bool_)
         history, model = ffi.new("history_t *"), self._sampled_every(1.0)
-        measured = ffi.new("float[]", KAN_MEASURED_INPUTS)
+        measured, before_A = ffi.new("float[]", KAN_MEASURED_INPUTS), 0.0
         steps_s = np.diff(recording.time_s, prepend=recording.time_s[0] - 1.0)
         for row, (inputs, step_s) in enumerate(zip(recording.inputs.tolist(), steps_s.tolist())):
             for place, lag in enumerate(self._network.lags):
                 model.lag[place].decay, model.lag[place].gain = lag.decay(step_s), lag.gain(step_s)
             for place in range(KAN_MEASURED_INPUTS):
                 measured[place] = inputs[place]
-            # The filters begin at rest: the first row starts them and fills nothing into them.
-            lib.history_step(history, model, measured[0] if row else 0.0, measured[2], True)
+            # The current of a row flows until the next one; before the first the cell rested.
+            lib.history_step(history, model, before_A, measured[2], True)
+            before_A = inputs[0]
             estimate = lib.history_estimate(history, model, measured)
             core[row], in_domain[row] = estimate.core_temperature_K, estimate.in_domain
         return core, in_domain

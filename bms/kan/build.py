@@ -39,7 +39,8 @@ from bms.tables.rounding import edge_error_bounds, fits_firmware
 
 Progress = Callable[[float], None]
 
-_TRAINING_SHARE = 2.0 / 3.0
+TRAINING_SHARE = 2.0 / 3.0
+"""Of a recording; the rest tests."""
 _BOX_MARGIN = 0.1
 _SMALLEST_HALF_RANGE = 0.5
 _FEWEST_ROWS = 100
@@ -126,8 +127,8 @@ def model_for_measurements(path: Path, settings: TrainingSettings, progress: Pro
 
 def split_by_time(recording: Samples) -> tuple[Samples, Samples]:
     """The first two thirds of a recording, for training, and the last one, for testing."""
-    cut = round(_TRAINING_SHARE * len(recording.core_temperature_K))
-    return _rows(recording, slice(cut)), _rows(recording, slice(cut, None))
+    cut = round(TRAINING_SHARE * len(recording.core_temperature_K))
+    return recording.rows(slice(cut)), recording.rows(slice(cut, None))
 
 
 def finished_model(
@@ -155,15 +156,6 @@ def finished_model(
 
 def _figures(network: Network, samples: Samples) -> ErrorFigures:
     return error_figures(network.evaluate(samples.inputs)[0], samples.core_temperature_K)
-
-
-def _rows(samples: Samples, rows: slice) -> Samples:
-    return Samples(
-        samples.inputs[rows],
-        samples.core_temperature_K[rows],
-        samples.profile[rows],
-        samples.time_s[rows],
-    )
 
 
 def _box(inputs: Array) -> Ranges:

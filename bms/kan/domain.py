@@ -17,7 +17,8 @@ from bms.validation import Finite, strict
 
 Array = npt.NDArray[np.float64]
 _MARGIN = 0.3
-_LEAST_MARGIN = 0.01
+_LEAST_MARGIN = 0.15
+_LEAST_RANGE = 0.5
 
 
 @strict
@@ -55,14 +56,20 @@ EVERYWHERE = Domain()
 def domain_of(x: Array) -> Domain:
     """Domain of normalised training inputs (N, n_in), with a margin of 30 % of each width.
 
-    Profiles that training has not seen go up to 29 % beyond (measured on both presets): what is
-    flagged ends a charge, so the margin is that wide.
+    What is flagged ends a charge, so the margin is wide enough for profiles that training has not
+    seen, and no less than sensor errors need. Inputs that hardly vary have no part in the
+    directions: how far they may go, the box says.
     """
-    centred = x - x.mean(axis=0)
-    _, directions = np.linalg.eigh(centred.T @ centred)
+    varying = np.flatnonzero(np.ptp(x, axis=0) >= _LEAST_RANGE)
+    if not len(varying):
+        return EVERYWHERE
+    centred = x[:, varying] - x[:, varying].mean(axis=0)
+    _, inner = np.linalg.eigh(centred.T @ centred)
+    directions = np.zeros((x.shape[1], len(varying)))
+    directions[varying] = inner
     # An eigenvector's sign is arbitrary; its largest component is made positive.
     directions = directions * np.sign(
-        directions[np.abs(directions).argmax(axis=0), range(x.shape[1])]
+        directions[np.abs(directions).argmax(axis=0), range(len(varying))]
     )
     along = x @ directions
     low, high = along.min(axis=0), along.max(axis=0)

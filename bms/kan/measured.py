@@ -27,6 +27,7 @@ REACH = 1.5
 _STRETCHES = 8
 _ROUGHNESS = tuple(10.0 ** np.arange(-6.0, 2.0, 0.5))
 _TOLERATED = 1.05
+_SHARE_FITTED = 0.75
 
 
 def train_on_recording(
@@ -38,10 +39,13 @@ def train_on_recording(
     """Network fitted to one recording whose inputs lie within `ranges`.
 
     With one hidden node it is the smoothest additive fit whose error is within 5 % of the best;
-    other widths are trained as on simulated data. Raises InputError when the width does not fit.
+    other widths are trained as on simulated data, the last quarter being held out to choose by.
+    Raises InputError when the width does not fit.
     """
     if not settings.has_one_hidden_node:
-        return train_network(training, training, ranges, settings, progress)
+        cut = round(_SHARE_FITTED * training.core_temperature_K.size)
+        fitted, held_out = training.rows(slice(cut)), training.rows(slice(cut, None))
+        return train_network(fitted, held_out, ranges, settings, progress)
     scaling = Scaling.of(training, ranges, settings)
     x, target = scaling.normalised(training)
     errors = []

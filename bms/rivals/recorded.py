@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from bms.data.measurements import Measurements, read_measurements
-from bms.data.simulate import Samples
 from bms.errors import InputError
 from bms.identification import identify
+from bms.kan.build import TRAINING_SHARE
 from bms.kan.lags import Lags
 from bms.presets import Preset
 from bms.rivals.estimator import Sequences
@@ -18,7 +18,6 @@ from bms.rivals.problem import Problem
 from bms.rivals.thermal import FilterNoise, reading_std
 from bms.rivals.tuning import FittedRows, tuned_filter, tuned_noise
 
-_FITTED_SHARE = 2.0 / 3.0
 _VALIDATION_SHARE = 0.25
 _UNEVEN = 0.01
 _START = FilterNoise(
@@ -41,7 +40,7 @@ def recorded_problem(path: Path, start: Preset, fit_cell: bool, lags: Lags) -> P
     """
     recording = read_measurements(path)
     rows = len(recording.time_s)
-    cut = round(_FITTED_SHARE * rows)
+    cut = round(TRAINING_SHARE * rows)
     period_s = _period_s(path, recording)
     samples = recording.samples(lags)
     test = Sequences.of(samples)
@@ -57,10 +56,10 @@ def recorded_problem(path: Path, start: Preset, fit_cell: bool, lags: Lags) -> P
     noise = tuned_noise(cell, start_noise, rows_to_fit)
     return Problem(
         title=f"{path.name}, last third of {rows} rows",
-        training=_part(samples, slice(cut)),
-        before_validation=_part(samples, slice(validated)),
-        validation=_part(samples, slice(validated, cut)),
-        floor_choice=_part(samples, slice(cut, None)),
+        training=samples.rows(slice(cut)),
+        before_validation=samples.rows(slice(validated)),
+        validation=samples.rows(slice(validated, cut)),
+        floor_choice=samples.rows(slice(cut, None)),
         floor_chosen_by="the last third itself",
         test=test,
         scopes={"fitted two thirds": fitted, "last third": ~fitted},
@@ -92,12 +91,3 @@ def _period_s(path: Path, recording: Measurements) -> float:
             f"{period_s:g} s; filters need even sampling, resample the recording"
         )
     return period_s
-
-
-def _part(samples: Samples, rows: slice) -> Samples:
-    return Samples(
-        samples.inputs[rows],
-        samples.core_temperature_K[rows],
-        samples.profile[rows],
-        samples.time_s[rows],
-    )

@@ -122,10 +122,11 @@ def _node_errors(network: Network, period_s: float) -> Array:
 def _filter_error(lag: Lag, largest: Array, place: int, period_s: float) -> float:
     """Bound on the rounding error of a filter's value, which forgets its past by its decay.
 
-    Each step rounds the decay, the gain, their products and the sum.
+    Each step rounds the decay, the gain, their products and the sum; what a step adds is no more
+    than the filter's largest value.
     """
     fresh = 1.0 - lag.decay(period_s)
-    own = 3.0 * UNIT * largest[place] / fresh
+    own = 5.0 * UNIT * largest[place] / fresh
     if lag.quantity == "current_squared_A2":
         return float(own + 5.0 * UNIT * largest[0] ** 2)
     # Differences of neighbouring readings are exact; their rounding errors cancel but for two.

@@ -1168,3 +1168,160 @@ bool can_db_identity_firmware_version_is_in_phys_range(double value)
 {
     return ((value >= 0.0) && (value <= 65535.0));
 }
+
+int can_db_network_diagnostics_pack(
+    uint8_t *dst_p,
+    const struct can_db_network_diagnostics_t *src_p,
+    size_t size)
+{
+    if (size < 8u) {
+        return (-EINVAL);
+    }
+
+    memset(&dst_p[0], 0, 8);
+
+    dst_p[0] |= pack_left_shift_u8(src_p->network_diagnostics_crc, 0u, 0xffu);
+    dst_p[1] |= pack_left_shift_u8(src_p->network_diagnostics_counter, 0u, 0x0fu);
+    dst_p[1] |= pack_left_shift_u8(src_p->reported_message, 4u, 0xf0u);
+    dst_p[2] |= pack_left_shift_u8(src_p->reported_state, 0u, 0x0fu);
+    dst_p[3] |= pack_left_shift_u8(src_p->wrong_crc_frames, 0u, 0xffu);
+    dst_p[4] |= pack_left_shift_u8(src_p->wrong_length_frames, 0u, 0xffu);
+    dst_p[5] |= pack_left_shift_u8(src_p->repeated_frames, 0u, 0xffu);
+    dst_p[6] |= pack_left_shift_u8(src_p->lost_frames, 0u, 0xffu);
+    dst_p[7] |= pack_left_shift_u8(src_p->reordered_frames, 0u, 0xffu);
+
+    return (8);
+}
+
+int can_db_network_diagnostics_unpack(
+    struct can_db_network_diagnostics_t *dst_p,
+    const uint8_t *src_p,
+    size_t size)
+{
+    if (size < 8u) {
+        return (-EINVAL);
+    }
+
+    dst_p->network_diagnostics_crc = unpack_right_shift_u8(src_p[0], 0u, 0xffu);
+    dst_p->network_diagnostics_counter = unpack_right_shift_u8(src_p[1], 0u, 0x0fu);
+    dst_p->reported_message = unpack_right_shift_u8(src_p[1], 4u, 0xf0u);
+    dst_p->reported_state = unpack_right_shift_u8(src_p[2], 0u, 0x0fu);
+    dst_p->wrong_crc_frames = unpack_right_shift_u8(src_p[3], 0u, 0xffu);
+    dst_p->wrong_length_frames = unpack_right_shift_u8(src_p[4], 0u, 0xffu);
+    dst_p->repeated_frames = unpack_right_shift_u8(src_p[5], 0u, 0xffu);
+    dst_p->lost_frames = unpack_right_shift_u8(src_p[6], 0u, 0xffu);
+    dst_p->reordered_frames = unpack_right_shift_u8(src_p[7], 0u, 0xffu);
+
+    return (0);
+}
+
+int can_db_network_diagnostics_init(struct can_db_network_diagnostics_t *msg_p)
+{
+    if (msg_p == NULL) return -1;
+
+    memset(msg_p, 0, sizeof(struct can_db_network_diagnostics_t));
+
+    return 0;
+}
+
+bool can_db_network_diagnostics_network_diagnostics_crc_is_in_range(uint8_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_network_diagnostics_network_diagnostics_crc_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 255.0));
+}
+
+bool can_db_network_diagnostics_network_diagnostics_counter_is_in_range(uint8_t value)
+{
+    return (value <= 15u);
+}
+
+bool can_db_network_diagnostics_network_diagnostics_counter_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 15.0));
+}
+
+bool can_db_network_diagnostics_reported_message_is_in_range(uint8_t value)
+{
+    return (value <= 15u);
+}
+
+bool can_db_network_diagnostics_reported_message_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 15.0));
+}
+
+bool can_db_network_diagnostics_reported_state_is_in_range(uint8_t value)
+{
+    return (value <= 15u);
+}
+
+bool can_db_network_diagnostics_reported_state_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 15.0));
+}
+
+bool can_db_network_diagnostics_wrong_crc_frames_is_in_range(uint8_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_network_diagnostics_wrong_crc_frames_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 255.0));
+}
+
+bool can_db_network_diagnostics_wrong_length_frames_is_in_range(uint8_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_network_diagnostics_wrong_length_frames_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 255.0));
+}
+
+bool can_db_network_diagnostics_repeated_frames_is_in_range(uint8_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_network_diagnostics_repeated_frames_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 255.0));
+}
+
+bool can_db_network_diagnostics_lost_frames_is_in_range(uint8_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_network_diagnostics_lost_frames_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 255.0));
+}
+
+bool can_db_network_diagnostics_reordered_frames_is_in_range(uint8_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_network_diagnostics_reordered_frames_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 255.0));
+}

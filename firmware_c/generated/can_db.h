@@ -56,6 +56,7 @@ extern "C" {
 #define CAN_DB_DECISION_MARGINS_FRAME_ID (0x183u)
 #define CAN_DB_DIAGNOSTICS_FRAME_ID (0x184u)
 #define CAN_DB_IDENTITY_FRAME_ID (0x185u)
+#define CAN_DB_NETWORK_DIAGNOSTICS_FRAME_ID (0x186u)
 
 /* Frame lengths in bytes. */
 #define CAN_DB_SYNC_LENGTH (0u)
@@ -69,6 +70,7 @@ extern "C" {
 #define CAN_DB_DECISION_MARGINS_LENGTH (8u)
 #define CAN_DB_DIAGNOSTICS_LENGTH (8u)
 #define CAN_DB_IDENTITY_LENGTH (8u)
+#define CAN_DB_NETWORK_DIAGNOSTICS_LENGTH (8u)
 
 /* Extended or standard frame types. */
 #define CAN_DB_SYNC_IS_EXTENDED (0)
@@ -82,6 +84,7 @@ extern "C" {
 #define CAN_DB_DECISION_MARGINS_IS_EXTENDED (0)
 #define CAN_DB_DIAGNOSTICS_IS_EXTENDED (0)
 #define CAN_DB_IDENTITY_IS_EXTENDED (0)
+#define CAN_DB_NETWORK_DIAGNOSTICS_IS_EXTENDED (0)
 
 /* Frame cycle times in milliseconds. */
 #define CAN_DB_SYNC_CYCLE_TIME_MS (100u)
@@ -95,6 +98,7 @@ extern "C" {
 #define CAN_DB_DECISION_MARGINS_CYCLE_TIME_MS (100u)
 #define CAN_DB_DIAGNOSTICS_CYCLE_TIME_MS (100u)
 #define CAN_DB_IDENTITY_CYCLE_TIME_MS (1000u)
+#define CAN_DB_NETWORK_DIAGNOSTICS_CYCLE_TIME_MS (500u)
 
 /* Signal choices. */
 #define CAN_DB_CHARGE_REQUEST_REQUEST_OFF_CHOICE (0u)
@@ -129,6 +133,38 @@ extern "C" {
 #define CAN_DB_DIAGNOSTICS_DIAGNOSTIC_STATE_COMPLETE_CHOICE (4u)
 #define CAN_DB_DIAGNOSTICS_DIAGNOSTIC_STATE_FAULT_CHOICE (5u)
 
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_ELECTRICAL_MISSING_CHOICE (0u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_THERMAL_MISSING_CHOICE (1u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_COOLANT_MISSING_CHOICE (2u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_REQUEST_MISSING_CHOICE (3u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_CURRENT_RANGE_CHOICE (4u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_VOLTAGE_RANGE_CHOICE (5u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_SURFACE_RANGE_CHOICE (6u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_COOLANT_RANGE_CHOICE (7u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_COOLING_RANGE_CHOICE (8u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_REQUEST_INVALID_CHOICE (9u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_OUT_OF_DOMAIN_CHOICE (10u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_CURRENT_DEVIATION_CHOICE (11u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_VOLTAGE_DEVIATION_CHOICE (12u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_OVER_VOLTAGE_CHOICE (13u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_CORE_OVER_TEMPERATURE_CHOICE (14u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_SURFACE_OVER_TEMPERATURE_CHOICE (15u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_CORRUPTED_FRAMES_CHOICE (16u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_DECISION_INVALID_CHOICE (17u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_CALIBRATION_CHOICE (18u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_SURFACE_DEFICIT_CHOICE (19u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_NONE_CHOICE (255u)
+
+#define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_MESSAGE_CELL_ELECTRICAL_CHOICE (0u)
+#define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_MESSAGE_CELL_THERMAL_CHOICE (1u)
+#define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_MESSAGE_COOLANT_CHOICE (2u)
+#define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_MESSAGE_CHARGE_REQUEST_CHOICE (3u)
+
+#define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_STATE_NO_DATA_CHOICE (0u)
+#define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_STATE_INIT_CHOICE (1u)
+#define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_STATE_VALID_CHOICE (2u)
+#define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_STATE_INVALID_CHOICE (3u)
+
 /* Frame Names. */
 #define CAN_DB_SYNC_NAME "SYNC"
 #define CAN_DB_CELL_ELECTRICAL_NAME "CellElectrical"
@@ -141,6 +177,7 @@ extern "C" {
 #define CAN_DB_DECISION_MARGINS_NAME "DecisionMargins"
 #define CAN_DB_DIAGNOSTICS_NAME "Diagnostics"
 #define CAN_DB_IDENTITY_NAME "Identity"
+#define CAN_DB_NETWORK_DIAGNOSTICS_NAME "NetworkDiagnostics"
 
 /* Signal Names. */
 #define CAN_DB_CELL_ELECTRICAL_CELL_ELECTRICAL_CRC_NAME "CellElectricalCrc"
@@ -190,6 +227,15 @@ extern "C" {
 #define CAN_DB_IDENTITY_MODEL_HASH_NAME "ModelHash"
 #define CAN_DB_IDENTITY_PRESET_HASH_NAME "PresetHash"
 #define CAN_DB_IDENTITY_FIRMWARE_VERSION_NAME "FirmwareVersion"
+#define CAN_DB_NETWORK_DIAGNOSTICS_NETWORK_DIAGNOSTICS_CRC_NAME "NetworkDiagnosticsCrc"
+#define CAN_DB_NETWORK_DIAGNOSTICS_NETWORK_DIAGNOSTICS_COUNTER_NAME "NetworkDiagnosticsCounter"
+#define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_MESSAGE_NAME "ReportedMessage"
+#define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_STATE_NAME "ReportedState"
+#define CAN_DB_NETWORK_DIAGNOSTICS_WRONG_CRC_FRAMES_NAME "WrongCrcFrames"
+#define CAN_DB_NETWORK_DIAGNOSTICS_WRONG_LENGTH_FRAMES_NAME "WrongLengthFrames"
+#define CAN_DB_NETWORK_DIAGNOSTICS_REPEATED_FRAMES_NAME "RepeatedFrames"
+#define CAN_DB_NETWORK_DIAGNOSTICS_LOST_FRAMES_NAME "LostFrames"
+#define CAN_DB_NETWORK_DIAGNOSTICS_REORDERED_FRAMES_NAME "ReorderedFrames"
 
 /**
  * Signals in message SYNC.
@@ -622,6 +668,84 @@ struct can_db_identity_t {
      * Offset: 0
      */
     uint16_t firmware_version;
+};
+
+/**
+ * Signals in message NetworkDiagnostics.
+ *
+ * How one of the messages to the ECU fared since start-up; the four take turns. A count of 255 means 255 or more.
+ *
+ * All signal values are as on the CAN bus.
+ */
+struct can_db_network_diagnostics_t {
+    /**
+     * Range: 0..255 (0..255 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t network_diagnostics_crc;
+
+    /**
+     * Range: 0..15 (0..15 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t network_diagnostics_counter;
+
+    /**
+     * Range: 0..15 (0..15 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t reported_message;
+
+    /**
+     * State of the message's end-to-end supervision. Only what is Valid, and came intact in this period, is used.
+     *
+     * Range: 0..15 (0..15 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t reported_state;
+
+    /**
+     * Range: 0..255 (0..255 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t wrong_crc_frames;
+
+    /**
+     * Range: 0..255 (0..255 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t wrong_length_frames;
+
+    /**
+     * Range: 0..255 (0..255 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t repeated_frames;
+
+    /**
+     * By the steps of the message's counter, so that a multiple of 16 lost in a row is not seen.
+     *
+     * Range: 0..255 (0..255 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t lost_frames;
+
+    /**
+     * Older than the last good frame, by no more than the largest step of the counter. Lost frames that come late are counted in both.
+     *
+     * Range: 0..255 (0..255 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t reordered_frames;
 };
 
 /**
@@ -2064,6 +2188,241 @@ bool can_db_identity_firmware_version_is_in_range(uint16_t value);
  * @return true if in range, false otherwise.
  */
 bool can_db_identity_firmware_version_is_in_phys_range(double value);
+
+/**
+ * Pack message NetworkDiagnostics.
+ *
+ * @param[out] dst_p Buffer to pack the message into.
+ * @param[in] src_p Data to pack.
+ * @param[in] size Size of dst_p.
+ *
+ * @return Size of packed data, or negative error code.
+ */
+int can_db_network_diagnostics_pack(
+    uint8_t *dst_p,
+    const struct can_db_network_diagnostics_t *src_p,
+    size_t size);
+
+/**
+ * Unpack message NetworkDiagnostics.
+ *
+ * @param[out] dst_p Object to unpack the message into.
+ * @param[in] src_p Message to unpack.
+ * @param[in] size Size of src_p.
+ *
+ * @return zero(0) or negative error code.
+ */
+int can_db_network_diagnostics_unpack(
+    struct can_db_network_diagnostics_t *dst_p,
+    const uint8_t *src_p,
+    size_t size);
+
+/**
+ * Init message fields to default values from NetworkDiagnostics.
+ *
+ * @param[in] msg_p Message to init.
+ *
+ * @return zero(0) on success or (-1) in case of nullptr argument.
+ */
+int can_db_network_diagnostics_init(struct can_db_network_diagnostics_t *msg_p);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_network_diagnostics_crc_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_network_diagnostics_crc_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_network_diagnostics_counter_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_network_diagnostics_counter_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_reported_message_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_reported_message_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_reported_state_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_reported_state_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_wrong_crc_frames_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_wrong_crc_frames_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_wrong_length_frames_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_wrong_length_frames_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_repeated_frames_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_repeated_frames_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_lost_frames_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_lost_frames_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_reordered_frames_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_network_diagnostics_reordered_frames_is_in_phys_range(double value);
 
 
 #ifdef __cplusplus

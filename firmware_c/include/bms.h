@@ -12,17 +12,16 @@
 #include "calibration.h"
 #include "can_frame.h"
 #include "codec.h"
-#include "e2e.h"
 #include "history.h"
 #include "kan.h"
 #include "monitor.h"
+#include "network.h"
 #include "rcbf.h"
 #include "soc.h"
 #include "thermal.h"
 
-#define BMS_FIRMWARE_VERSION 1
-#define BMS_RECEIVED_MESSAGES 4
-#define BMS_TRANSMITTED_MESSAGES 6
+#define BMS_FIRMWARE_VERSION 2
+#define BMS_TRANSMITTED_MESSAGES 7
 
 typedef enum {
     BMS_INIT = 0,
@@ -38,19 +37,13 @@ typedef struct {
 } bms_config_t;
 
 typedef struct {
-    e2e_receiver_t e2e;
-    bool fresh; /* a valid frame came since the last step */
-    bool seen;
-} bms_inbox_t;
-
-typedef struct {
     const bms_calibration_t *calibration;
     bms_state_t state;
     uint32_t periods;
     codec_measurement_t measurement;
-    bms_inbox_t inbox[BMS_RECEIVED_MESSAGES];
-    bool corrupted; /* a frame failed its end-to-end check since the last step */
-    bool may_start; /* the request has been off since start-up or the last charge */
+    network_t network;
+    bool has_started; /* all messages were valid once, or had the time to become so */
+    bool may_start;   /* the request has been off since start-up or the last charge */
     soc_t soc;
     bool soc_known;
     history_t history;

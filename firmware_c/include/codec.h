@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "can_frame.h"
+#include "e2e.h"
 
 typedef struct {
     float scale;
@@ -21,7 +22,9 @@ typedef struct {
     uint32_t id;
     uint8_t length;
     uint8_t is_protected;
-    uint8_t data_ids[16];
+    uint8_t every_periods;
+    e2e_policy_t policy;
+    uint8_t data_ids[E2E_COUNTERS];
 } codec_message_t;
 
 typedef enum { CODEC_NEAREST, CODEC_TOWARDS_ZERO } codec_rounding_t;
@@ -61,6 +64,9 @@ typedef struct {
     uint8_t first_fault;
     uint32_t active_faults;
     uint32_t latched_faults;
+    uint8_t reported_message; /* order of CAN_RECEIVED */
+    uint8_t reported_state;   /* e2e_state_t */
+    e2e_counts_t reported_counts;
     uint32_t model_hash;
     uint16_t preset_hash;
     uint16_t firmware_version;

@@ -10,26 +10,26 @@
 #include <stdint.h>
 
 typedef enum {
-    FAULT_ELECTRICAL_MISSING = 0,
-    FAULT_THERMAL_MISSING = 1,
-    FAULT_COOLANT_MISSING = 2,
-    FAULT_REQUEST_MISSING = 3,
-    FAULT_CURRENT_RANGE = 4,
-    FAULT_VOLTAGE_RANGE = 5,
-    FAULT_SURFACE_RANGE = 6,
-    FAULT_COOLANT_RANGE = 7,
-    FAULT_COOLING_RANGE = 8,
-    FAULT_REQUEST_INVALID = 9,
-    FAULT_OUT_OF_DOMAIN = 10,
-    FAULT_CURRENT_DEVIATION = 11,
-    FAULT_VOLTAGE_DEVIATION = 12,
-    FAULT_OVER_VOLTAGE = 13,
-    FAULT_CORE_OVER_TEMPERATURE = 14,
-    FAULT_SURFACE_OVER_TEMPERATURE = 15,
-    FAULT_CORRUPTED_FRAMES = 16,
-    FAULT_DECISION_INVALID = 17,
-    FAULT_CALIBRATION = 18,
-    FAULT_SURFACE_DEFICIT = 19
+    FAULT_ELECTRICAL_MISSING = 0, /* no usable CellElectrical message */
+    FAULT_THERMAL_MISSING = 1, /* no usable CellThermal message */
+    FAULT_COOLANT_MISSING = 2, /* no usable Coolant message */
+    FAULT_REQUEST_MISSING = 3, /* no usable ChargeRequest message */
+    FAULT_CURRENT_RANGE = 4, /* current implausible or not available */
+    FAULT_VOLTAGE_RANGE = 5, /* voltage implausible or not available */
+    FAULT_SURFACE_RANGE = 6, /* surface temperature implausible or not available */
+    FAULT_COOLANT_RANGE = 7, /* coolant temperature implausible or not available */
+    FAULT_COOLING_RANGE = 8, /* cooling power implausible or not available */
+    FAULT_REQUEST_INVALID = 9, /* unknown request, or its numbers make no charge */
+    FAULT_OUT_OF_DOMAIN = 10, /* inputs outside of what the estimator was trained on */
+    FAULT_CURRENT_DEVIATION = 11, /* current is not the one commanded */
+    FAULT_VOLTAGE_DEVIATION = 12, /* voltage does not fit state of charge and current */
+    FAULT_OVER_VOLTAGE = 13, /* voltage above its limit */
+    FAULT_CORE_OVER_TEMPERATURE = 14, /* core estimate above its limit */
+    FAULT_SURFACE_OVER_TEMPERATURE = 15, /* surface temperature above its limit */
+    FAULT_CORRUPTED_FRAMES = 16, /* frames refused by the end-to-end check */
+    FAULT_DECISION_INVALID = 17, /* the decision is not a number */
+    FAULT_CALIBRATION = 18, /* calibration missing or damaged */
+    FAULT_SURFACE_DEFICIT = 19 /* surface reads colder than the heat allows */
 } fault_t;
 
 #define FAULT_COUNT 20
@@ -51,6 +51,9 @@ typedef struct {
 extern const fault_policy_t MONITOR_POLICY[FAULT_COUNT];
 
 void monitor_reset(monitor_t *monitor);
+
+/* Whether any of these symptoms, bit n for fault n, forbids current in its own period. */
+bool monitor_stops(uint32_t symptoms);
 
 /* Takes the symptoms of one period, bit n for fault n. */
 void monitor_step(monitor_t *monitor, uint32_t symptoms);

@@ -8,11 +8,7 @@
 
 /* Periods that the other nodes have to come up before their silence is a fault. */
 #define START_UP_PERIODS 50u
-#define IDENTITY_EVERY_PERIODS 10u
-/* Counter steps of a message that may be skipped before its sequence counts as broken. */
-#define MAX_COUNTER_JUMP 3u
 
-typedef char received_messages_agree[(BMS_RECEIVED_MESSAGES == CAN_RECEIVED_COUNT) ? 1 : -1];
 typedef char transmitted_messages_agree[(BMS_TRANSMITTED_MESSAGES == CAN_TRANSMITTED_COUNT) ? 1
                                                                                            : -1];
 typedef char faults_fit_into_their_signal[(FAULT_COUNT <= 20) ? 1 : -1];
@@ -36,9 +32,9 @@ static bool is_charging(const bms_t *bms)
     return (bms->state == BMS_CHARGING) || (bms->state == BMS_DERATED);
 }
 
-static bool is_fresh(const bms_t *bms, uint32_t message)
+static bool is_usable(const bms_t *bms, uint32_t message)
 {
-    return bms->inbox[message].fresh;
+    return bms->network.is_usable[message];
 }
 
 void bms_init(bms_t *bms, const bms_config_t *config)
@@ -55,21 +51,7 @@ void bms_init(bms_t *bms, const bms_config_t *config)
 
 void bms_receive(bms_t *bms, const can_frame_t *frame)
 {
-    for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
-        const codec_message_t *message = &CAN_RECEIVED[i];
-        if (frame->id != message->id) {
-            continue;
-        }
-        bms_inbox_t *inbox = &bms->inbox[i];
-        if (e2e_check(&inbox->e2e, frame->data, frame->length, message->length, message->data_ids,
-                      MAX_COUNTER_JUMP) == E2E_OK) {
-            codec_read(i, frame->data, &bms->measurement);
-            inbox->fresh = true;
-            inbox->seen = true;
-        } else {
-            bms->corrupted = true;
-        }
-    }
+    network_receive(&bms->network, frame, &bms->measurement);
 }
 
 static uint32_t symptoms_of_missing_messages(const bms_t *bms)
@@ -80,9 +62,9 @@ static uint32_t symptoms_of_missing_messages(const bms_t *bms)
         [CAN_RECEIVED_COOLANT] = FAULT_COOLANT_MISSING,
         [CAN_RECEIVED_CHARGE_REQUEST] = FAULT_REQUEST_MISSING,
     };
-    uint32_t symptoms = bit_if(bms->corrupted, FAULT_CORRUPTED_FRAMES);
+    uint32_t symptoms = bit_if(bms->network.is_disturbed, FAULT_CORRUPTED_FRAMES);
     for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
-        symptoms |= bit_if(!bms->inbox[i].fresh, MISSING[i]);
+        symptoms |= bit_if(!is_usable(bms, i), MISSING[i]);
     }
     return symptoms;
 }
@@ -101,9 +83,9 @@ static uint32_t symptoms_of_readings(const bms_t *bms)
     const codec_measurement_t *m = &bms->measurement;
     const plausibility_t *limits = &bms->calibration->plausibility;
     const rcbf_constants_t *cell = &bms->calibration->rcbf;
-    const bool electrical = is_fresh(bms, CAN_RECEIVED_CELL_ELECTRICAL);
-    const bool thermal = is_fresh(bms, CAN_RECEIVED_CELL_THERMAL);
-    const bool coolant = is_fresh(bms, CAN_RECEIVED_COOLANT);
+    const bool electrical = is_usable(bms, CAN_RECEIVED_CELL_ELECTRICAL);
+    const bool thermal = is_usable(bms, CAN_RECEIVED_CELL_THERMAL);
+    const bool coolant = is_usable(bms, CAN_RECEIVED_COOLANT);
     const float model_V = rcbf_open_circuit_voltage_V(cell, bms->soc.soc) -
                           m->current_A * cell->ohmic_resistance_ohm;
     const float deviation_A = numeric_abs(m->current_A - bms->command_A);
@@ -124,7 +106,7 @@ static uint32_t symptoms_of_readings(const bms_t *bms)
                   FAULT_COOLANT_RANGE) |
            bit_if(coolant && is_outside(m->cooling_power_W, &limits->cooling_power_W),
                   FAULT_COOLING_RANGE) |
-           bit_if(is_fresh(bms, CAN_RECEIVED_CHARGE_REQUEST) && !request_is_valid(bms),
+           bit_if(is_usable(bms, CAN_RECEIVED_CHARGE_REQUEST) && !request_is_valid(bms),
                   FAULT_REQUEST_INVALID) |
            bit_if(electrical && thermal && coolant && !bms->estimate.in_domain,
                   FAULT_OUT_OF_DOMAIN) |
@@ -167,9 +149,9 @@ static void update_estimates(bms_t *bms)
     const codec_measurement_t *m = &bms->measurement;
     const bms_calibration_t *calibration = bms->calibration;
     const plausibility_t *limits = &calibration->plausibility;
-    const bool is_current_usable = is_fresh(bms, CAN_RECEIVED_CELL_ELECTRICAL) &&
+    const bool is_current_usable = is_usable(bms, CAN_RECEIVED_CELL_ELECTRICAL) &&
                                    !is_outside(m->current_A, &limits->current_A);
-    const bool is_thermal_fresh = is_fresh(bms, CAN_RECEIVED_CELL_THERMAL);
+    const bool is_thermal_fresh = is_usable(bms, CAN_RECEIVED_CELL_THERMAL);
     const bool is_surface_usable =
         is_thermal_fresh && !is_outside(m->surface_temperature_K, &limits->surface_temperature_K);
     const bool is_coolant_usable =
@@ -181,7 +163,7 @@ static void update_estimates(bms_t *bms)
     }
     update_surface_temperature(bms, current_A, is_surface_usable && is_coolant_usable);
     history_step(&bms->history, &calibration->kan, current_A, bms->surface_temperature_K,
-                 is_current_usable && is_surface_usable);
+                 is_surface_usable);
     const float measured[KAN_MEASURED_INPUTS] = { m->current_A, m->cooling_power_W,
                                                   bms->surface_temperature_K,
                                                   m->coolant_temperature_K };
@@ -196,7 +178,7 @@ static void update_estimates(bms_t *bms)
  * that restarts in mid-charge stays off until somebody tells it the state of charge. */
 static void follow_request(bms_t *bms, uint32_t symptoms)
 {
-    if (!is_fresh(bms, CAN_RECEIVED_CHARGE_REQUEST)) {
+    if (!is_usable(bms, CAN_RECEIVED_CHARGE_REQUEST)) {
         return;
     }
     if (bms->measurement.request == REQUEST_OFF) {
@@ -250,26 +232,27 @@ static void decide(bms_t *bms)
 
 static void run_period(bms_t *bms)
 {
-    if (bms->state == BMS_INIT) {
-        bool all_seen = true;
-        for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
-            all_seen = all_seen && bms->inbox[i].seen;
-        }
-        if (!all_seen && (bms->periods < START_UP_PERIODS)) {
-            return;
-        }
+    bms->has_started = bms->has_started || network_is_valid(&bms->network) ||
+                       (bms->periods >= START_UP_PERIODS);
+    if (!bms->has_started) {
+        return;
     }
     update_estimates(bms);
+    uint32_t symptoms = symptoms_of_missing_messages(bms) | symptoms_of_readings(bms);
     if (bms->state == BMS_INIT) {
         if (history_is_settling(&bms->history, &bms->calibration->kan)) {
+            /* Filters that have not settled are no fault while nobody relies on them. */
+            monitor_step(&bms->monitor, symptoms & ~bit_if(true, FAULT_OUT_OF_DOMAIN));
+            bms->state = (bms->monitor.latched != 0u) ? BMS_FAULT : BMS_INIT;
             return;
         }
         bms->state = BMS_STANDBY;
     }
-    uint32_t symptoms = symptoms_of_missing_messages(bms) | symptoms_of_readings(bms);
     follow_request(bms, symptoms);
     decide(bms);
-    symptoms |= bit_if(is_charging(bms) && (bms->decision.active == RCBF_INVALID),
+    /* A reading that is no number spoils the decision too, but has a name of its own. */
+    symptoms |= bit_if(!monitor_stops(symptoms) && is_charging(bms) &&
+                           (bms->decision.active == RCBF_INVALID),
                        FAULT_DECISION_INVALID);
     monitor_step(&bms->monitor, symptoms);
     if (bms->monitor.latched != 0u) {
@@ -281,6 +264,10 @@ static void run_period(bms_t *bms)
 
 static void queue_frames(bms_t *bms)
 {
+    /* The received messages take turns in being reported. */
+    const uint32_t turn =
+        bms->periods / CAN_TRANSMITTED[CAN_TRANSMITTED_NETWORK_DIAGNOSTICS].every_periods;
+    const uint8_t reported = (uint8_t)(turn % CAN_RECEIVED_COUNT);
     const codec_report_t report = {
         .command_A = bms->command_A,
         .state = (uint8_t)bms->state,
@@ -299,6 +286,9 @@ static void queue_frames(bms_t *bms)
         .first_fault = bms->monitor.first,
         .active_faults = bms->monitor.active,
         .latched_faults = bms->monitor.latched,
+        .reported_message = reported,
+        .reported_state = (uint8_t)bms->network.receivers[reported].state,
+        .reported_counts = bms->network.receivers[reported].counts,
         .model_hash = (bms->calibration != NULL) ? bms->calibration->model_hash : 0u,
         .preset_hash = (uint16_t)((bms->calibration != NULL)
                                       ? (bms->calibration->preset_hash >> 16u)
@@ -308,7 +298,7 @@ static void queue_frames(bms_t *bms)
     bms->outbox_length = 0u;
     bms->outbox_next = 0u;
     for (uint32_t i = 0u; i < CAN_TRANSMITTED_COUNT; i++) {
-        if ((i == CAN_TRANSMITTED_IDENTITY) && (bms->periods % IDENTITY_EVERY_PERIODS != 0u)) {
+        if (bms->periods % CAN_TRANSMITTED[i].every_periods != 0u) {
             continue;
         }
         can_frame_t *frame = &bms->outbox[bms->outbox_length];
@@ -324,6 +314,7 @@ static void queue_frames(bms_t *bms)
 
 void bms_step(bms_t *bms)
 {
+    network_step(&bms->network);
     if (bms->calibration != NULL) {
         run_period(bms);
     } else {
@@ -332,10 +323,6 @@ void bms_step(bms_t *bms)
     }
     queue_frames(bms);
     bms->periods++;
-    bms->corrupted = false;
-    for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
-        bms->inbox[i].fresh = false;
-    }
 }
 
 bool bms_transmit(bms_t *bms, can_frame_t *frame)

@@ -8,6 +8,9 @@
 
 /* Share of a step by which float32 may miss a value that lies exactly on a step. */
 #define STEP_TOLERANCE 0.02f
+/* All ones of the fields that carry a code. */
+#define TWO_BITS 3u
+#define FOUR_BITS 15u
 
 uint16_t codec_encode(const codec_signal_t *signal, float value, codec_rounding_t rounding)
 {
@@ -35,6 +38,12 @@ static float decode(uint32_t signal, uint16_t raw)
 static uint16_t encode(uint32_t signal, float value)
 {
     return codec_encode(&CAN_SIGNALS[signal], value, CODEC_NEAREST);
+}
+
+/* A code that its field cannot hold becomes all ones, which says "not available". */
+static uint8_t code(uint8_t value, uint8_t all_ones)
+{
+    return (value < all_ones) ? value : all_ones;
 }
 
 void codec_read(uint32_t index, const uint8_t *data, codec_measurement_t *measurement)
@@ -83,7 +92,7 @@ static void write_estimate(const codec_report_t *report, uint8_t *data)
         .core_temperature = encode(CAN_SIGNAL_CORE_TEMPERATURE, report->core_temperature_K),
         .state_of_charge = encode(CAN_SIGNAL_STATE_OF_CHARGE, report->soc),
         .error_bound = encode(CAN_SIGNAL_ERROR_BOUND, report->error_bound_K),
-        .in_domain = report->in_domain,
+        .in_domain = code(report->in_domain, TWO_BITS),
     };
     (void)can_db_estimate_pack(data, &message, CAN_DB_ESTIMATE_LENGTH);
 }
@@ -91,8 +100,8 @@ static void write_estimate(const codec_report_t *report, uint8_t *data)
 static void write_decision(const codec_report_t *report, uint8_t *data)
 {
     const struct can_db_decision_t message = {
-        .active_constraint = report->active_constraint,
-        .feasible = report->feasible,
+        .active_constraint = code(report->active_constraint, FOUR_BITS),
+        .feasible = code(report->feasible, TWO_BITS),
         .lower_current = encode(CAN_SIGNAL_LOWER_CURRENT, report->lower_A),
         .upper_current = encode(CAN_SIGNAL_UPPER_CURRENT, report->upper_A),
     };
@@ -113,12 +122,26 @@ static void write_margins(const codec_report_t *report, uint8_t *data)
 static void write_diagnostics(const codec_report_t *report, uint8_t *data)
 {
     const struct can_db_diagnostics_t message = {
-        .diagnostic_state = report->state,
+        .diagnostic_state = code(report->state, FOUR_BITS),
         .first_fault = report->first_fault,
         .active_faults = report->active_faults,
         .latched_faults = report->latched_faults,
     };
     (void)can_db_diagnostics_pack(data, &message, CAN_DB_DIAGNOSTICS_LENGTH);
+}
+
+static void write_network_diagnostics(const codec_report_t *report, uint8_t *data)
+{
+    const struct can_db_network_diagnostics_t message = {
+        .reported_message = code(report->reported_message, FOUR_BITS),
+        .reported_state = code(report->reported_state, FOUR_BITS),
+        .wrong_crc_frames = report->reported_counts.wrong_crc,
+        .wrong_length_frames = report->reported_counts.wrong_length,
+        .repeated_frames = report->reported_counts.repeated,
+        .lost_frames = report->reported_counts.lost,
+        .reordered_frames = report->reported_counts.reordered,
+    };
+    (void)can_db_network_diagnostics_pack(data, &message, CAN_DB_NETWORK_DIAGNOSTICS_LENGTH);
 }
 
 static void write_identity(const codec_report_t *report, uint8_t *data)
@@ -136,7 +159,7 @@ static void write_command(const codec_report_t *report, uint8_t *data)
     const struct can_db_charge_command_t message = {
         .command_current = codec_encode(&CAN_SIGNALS[CAN_SIGNAL_COMMAND_CURRENT],
                                         report->command_A, CODEC_TOWARDS_ZERO),
-        .command_state = report->state,
+        .command_state = code(report->state, FOUR_BITS),
     };
     (void)can_db_charge_command_pack(data, &message, CAN_DB_CHARGE_COMMAND_LENGTH);
 }
@@ -148,6 +171,7 @@ void codec_write(uint32_t index, const codec_report_t *report, can_frame_t *fram
         [CAN_TRANSMITTED_DECISION] = write_decision,
         [CAN_TRANSMITTED_DECISION_MARGINS] = write_margins,
         [CAN_TRANSMITTED_DIAGNOSTICS] = write_diagnostics,
+        [CAN_TRANSMITTED_NETWORK_DIAGNOSTICS] = write_network_diagnostics,
         [CAN_TRANSMITTED_IDENTITY] = write_identity,
         [CAN_TRANSMITTED_CHARGE_COMMAND] = write_command,
     };

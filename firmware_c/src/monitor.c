@@ -36,12 +36,20 @@ void monitor_reset(monitor_t *monitor)
     monitor->stop = false;
 }
 
+bool monitor_stops(uint32_t symptoms)
+{
+    bool stops = false;
+    for (uint32_t fault = 0u; fault < FAULT_COUNT; fault++) {
+        stops = stops || (MONITOR_POLICY[fault].stops_at_once && ((symptoms >> fault & 1u) != 0u));
+    }
+    return stops;
+}
+
 void monitor_step(monitor_t *monitor, uint32_t symptoms)
 {
     monitor->active = symptoms;
-    monitor->stop = false;
+    monitor->stop = monitor_stops(symptoms);
     for (uint32_t fault = 0u; fault < FAULT_COUNT; fault++) {
-        const fault_policy_t *policy = &MONITOR_POLICY[fault];
         const uint32_t bit = (uint32_t)1u << fault;
         if ((symptoms & bit) == 0u) {
             monitor->lasted[fault] = 0u;
@@ -50,8 +58,7 @@ void monitor_step(monitor_t *monitor, uint32_t symptoms)
         if (monitor->lasted[fault] < UINT8_MAX) {
             monitor->lasted[fault]++;
         }
-        monitor->stop = monitor->stop || policy->stops_at_once;
-        if (monitor->lasted[fault] >= policy->debounce_periods) {
+        if (monitor->lasted[fault] >= MONITOR_POLICY[fault].debounce_periods) {
             if (monitor->latched == 0u) {
                 monitor->first = (uint8_t)fault;
             }

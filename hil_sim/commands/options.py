@@ -44,11 +44,25 @@ OutOption = Annotated[
         "Default: nothing is written.",
     ),
 ]
+LogOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--log",
+        help="Record the bus to this file too: .log, .asc, .csv (also .gz), .blf or .mf4. "
+        "Default: nothing but can.log in --out.",
+    ),
+]
 JsonOption = Annotated[
     bool, typer.Option("--json", help="Print the summary as JSON and nothing else.")
 ]
 RealtimeOption = Annotated[
     bool, typer.Option("--realtime", help="Run on the wall clock instead of virtual time.")
+]
+FaultsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--faults", help="TOML file of faults to inject, see docs/faults.md. Default: none."
+    ),
 ]
 MaxTimeOption = Annotated[
     float,
@@ -59,7 +73,9 @@ __all__ = [
     "DEFAULT_PRESET",
     "BusOption",
     "DisturbanceOption",
+    "FaultsOption",
     "JsonOption",
+    "LogOption",
     "MaxTimeOption",
     "ModelOption",
     "OutOption",

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from hil_sim.logs import usable_format
 from hil_sim.recorder import Recorder
 from hil_sim.report.files import summary_json, write_report
 from hil_sim.report.folder import OutputFolder
@@ -36,24 +37,33 @@ def charge_and_report(
     out: Path | None,
     as_json: bool,
     baseline: Settings | None = None,
+    log: Path | None = None,
 ) -> int:
     """Run a charge, and a baseline beside it; print and write what came of it.
 
-    Returns the exit code: 1 when the controller, not the baseline, failed its check. Raises
-    InputError before the run when the folder cannot be written.
+    `log` is one more recording of the controller's bus, in the format of its suffix. Returns the
+    exit code: 1 when the controller, not the baseline, failed its check. Raises InputError before
+    the run when the folder or the log cannot be written.
     """
     with ExitStack() as stack:
         folder = stack.enter_context(OutputFolder(out)) if out is not None else None
+        log_folder = None
+        if log is not None:
+            usable_format(log)
+            log_folder = stack.enter_context(OutputFolder(log.parent, "--log"))
         with ExitStack() as during_run:
-            recorder = None
-            if folder is not None:
-                recorder = during_run.enter_context(Recorder(folder.path("can.log")))
+            paths = [folder.path("can.log")] if folder is not None else []
+            if log is not None and log_folder is not None:
+                paths.append(log_folder.path(log.name))
+            recorder = during_run.enter_context(Recorder(*paths)) if paths else None
             results = [_with_progress(settings, run, recorder, as_json)]
         if baseline is not None:
             results.append(_with_progress(baseline, run, None, as_json))
         if folder is not None:
             write_report(folder, settings, results)
             folder.commit()
+        if log_folder is not None:
+            log_folder.commit()
     if as_json:
         print(json.dumps(summary_json(results), indent=2))
     else:

@@ -10,6 +10,7 @@ from bms.presets import load_preset
 from hil_sim.commands import options
 from hil_sim.commands.outcome import charge_and_report
 from hil_sim.disturbances import DisturbanceKind
+from hil_sim.faults import load_faults
 from hil_sim.session import Settings, run_plant
 
 
@@ -18,7 +19,9 @@ def plant(
     preset: options.PresetOption = options.DEFAULT_PRESET,
     seed: options.SeedOption = 0,
     disturbance: options.DisturbanceOption = DisturbanceKind.NONE,
+    faults: options.FaultsOption = None,
     out: options.OutOption = None,
+    log: options.LogOption = None,
     json: options.JsonOption = False,
     realtime: options.RealtimeOption = False,
     max_time_s: options.MaxTimeOption = 3600.0,
@@ -43,8 +46,9 @@ def plant(
         bus=bus,
         seed=seed,
         disturbance=disturbance,
+        faults=() if faults is None else load_faults(faults),
         max_time_s=max_time_s,
         realtime=realtime,
         answer_timeout_s=answer_timeout_s,
     )
-    return charge_and_report(settings, run_plant, out, json)
+    return charge_and_report(settings, run_plant, out, json, log=log)

@@ -12,6 +12,7 @@ from bms.presets import load_preset
 from hil_sim.commands import options
 from hil_sim.commands.outcome import charge_and_report
 from hil_sim.disturbances import DisturbanceKind
+from hil_sim.faults import load_faults
 from hil_sim.session import ControllerKind, Settings, run_both
 
 
@@ -29,7 +30,9 @@ def sil(
     bus: options.BusOption = "virtual:bms",
     seed: options.SeedOption = 0,
     disturbance: options.DisturbanceOption = DisturbanceKind.NONE,
+    faults: options.FaultsOption = None,
     out: options.OutOption = None,
+    log: options.LogOption = None,
     json: options.JsonOption = False,
     realtime: options.RealtimeOption = False,
     max_time_s: options.MaxTimeOption = 3600.0,
@@ -54,8 +57,9 @@ def sil(
         bus=bus,
         seed=seed,
         disturbance=disturbance,
+        faults=() if faults is None else load_faults(faults),
         max_time_s=max_time_s,
         realtime=realtime,
     )
     second = None if baseline is None else replace(settings, controller=baseline)
-    return charge_and_report(settings, run_both, out, json, second)
+    return charge_and_report(settings, run_both, out, json, second, log)

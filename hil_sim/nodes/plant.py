@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from bms.errors import BusError
@@ -22,8 +23,11 @@ _FROM_ECU = (
     "Decision",
     "DecisionMargins",
     "Diagnostics",
+    "NetworkDiagnostics",
     "Identity",
 )
+
+Line = Callable[[list[Frame]], list[Frame]]
 
 
 @dataclass(frozen=True)
@@ -78,8 +82,15 @@ class PlantNode:
         database: dict[str, MessageCodec],
         turn: Turn,
         recorder: Recorder | None = None,
+        sent: Line = list,
+        heard: Line = list,
     ) -> None:
+        """`sent` and `heard` are where frames get lost or change on their way to and from the ECU.
+
+        What is recorded is what the ECU gets and what it says.
+        """
         self._bus = bus
+        self._sent, self._heard = sent, heard
         self._turn = turn
         self._recorder = recorder
         self._electrical = Sender(database["CellElectrical"])
@@ -101,7 +112,7 @@ class PlantNode:
         with the same frames, so that the ECU may start later than the plant. Raises BusError
         when none comes.
         """
-        frames = self._frames(readings, request)
+        frames = self._sent(self._frames(readings, request))
         late = self._late_frames(period) if self._is_answer_late else []
         for _ in range(CONNECT_ATTEMPTS):
             sent_s = self._turn.time_s(period)
@@ -127,7 +138,7 @@ class PlantNode:
                 self._recorder.record(sent_s, frame, received=False)
             for time_s, frame in heard:
                 self._recorder.record(time_s, frame, received=True)
-        return self._answer([frame for _, frame in heard])
+        return self._answer(self._heard([frame for _, frame in heard]))
 
     def _late_frames(self, period: int) -> list[tuple[float, Frame]]:
         """What came too late for the last period; it must not pass for an answer to this one."""

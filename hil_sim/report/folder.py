@@ -16,11 +16,12 @@ class OutputFolder:
 
     Entering raises InputError when the folder cannot be made or written. Leaving without commit
     leaves no trace, not even the folder and its parents when they were new; what the system
-    refuses to write meanwhile becomes InputError too.
+    refuses to write meanwhile becomes InputError too. `option` is what the user can change then.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, option: str = "--out") -> None:
         self._folder = folder
+        self._option = option
         self._temporary = folder
         self._made: list[Path] = []
 
@@ -36,7 +37,7 @@ class OutputFolder:
         moves = [(file, self._folder / file.name) for file in sorted(self._temporary.iterdir())]
         for _, target in moves:
             if target.is_dir():
-                raise InputError(f"{target}: is a folder; choose another --out")
+                raise InputError(f"{target}: is a folder; choose another {self._option}")
         for file, target in moves:
             file.replace(target)
         self._made = []
@@ -71,5 +72,6 @@ class OutputFolder:
 
     def _refusal(self, error: OSError) -> InputError:
         return InputError(
-            f"{self._folder}: cannot be written ({error.strerror or error}); choose another --out"
+            f"{self._folder}: cannot be written ({error.strerror or error}); "
+            f"choose another {self._option}"
         )

@@ -28,8 +28,18 @@ def test_slabs_end_thirty_percent_of_their_width_beyond_the_data():
     along = correlated() @ np.asarray(domain.directions).T
     width = np.ptp(along, axis=0)
     assert np.asarray(domain.high) - along.max(axis=0) == pytest.approx(
-        np.maximum(0.3 * width, 0.01)
+        np.maximum(0.3 * width, 0.15)
     )
+
+
+def test_an_input_that_never_varied_has_no_part_in_the_slabs():
+    """The box says how far it may go; a slab would be narrower than the sensor's noise."""
+    still = np.column_stack([correlated(), np.zeros(2000)])
+    domain = domain_of(still)
+    assert len(domain.directions) == 2
+    assert domain.contains(np.array([[0.5, 0.5, 1.0], [0.5, 0.5, -1.0]])).all()
+    assert not domain.contains(np.array([[0.8, -0.8, 0.0]])).any()
+    assert domain_of(np.zeros((50, 2))) == EVERYWHERE
 
 
 def test_not_a_number_is_nowhere_and_without_slabs_everything_else_is_inside():

@@ -14,10 +14,13 @@ from bms.errors import InputError, ModelMismatchError
 from bms.kan.model_file import load_shipped_model
 from bms.presets import DEFAULT_PRESET, load_preset
 from codegen.calibration_source import calibration_source
+from codegen.can_document import can_document
 from codegen.can_sources import can_sources
 from codegen.rendering import float_literal, write_files
 
-GENERATED = Path(__file__).parents[2] / "firmware_c" / "generated"
+ROOT = Path(__file__).parents[2]
+FIRMWARE = ROOT / "firmware_c"
+GENERATED = FIRMWARE / "generated"
 
 
 def regenerated() -> dict[str, str]:
@@ -32,8 +35,14 @@ def test_checked_in_sources_are_what_the_generator_writes() -> None:
         assert (GENERATED / name).read_text() == text, f"{name}: run 'make generate'"
 
 
+def test_checked_in_document_of_the_bus_is_what_the_generator_writes() -> None:
+    written = (ROOT / "docs" / "can.md").read_text(encoding="utf-8")
+    assert written == can_document(FIRMWARE), "run 'make generate'"
+
+
 def test_generation_is_deterministic() -> None:
     assert regenerated() == regenerated()
+    assert can_document(FIRMWARE) == can_document(FIRMWARE)
 
 
 def test_generated_files_say_where_they_come_from_and_carry_no_date() -> None:

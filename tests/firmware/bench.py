@@ -12,6 +12,8 @@ from codegen.can_database import data_ids, load_database
 
 DATABASE = load_database()
 MEASURED = ("CellElectrical", "CellThermal", "Coolant", "ChargeRequest")
+READY_PERIODS = 3
+"""Good periods that make a message valid."""
 STATES = ("Init", "Standby", "Charging", "Derated", "Complete", "Fault")
 
 HEALTHY: dict[str, float] = {
@@ -82,9 +84,14 @@ class Bench:
 
     def start(self, **changes: float) -> dict[str, Any]:
         """Bring the ECU to charging."""
-        self.period(Request=0, **changes)
+        self.get_ready(**changes)
         self.period(Request=1)
         return self.period()
+
+    def get_ready(self, **changes: float) -> None:
+        """Let the ECU see enough of every message, with the request off."""
+        for _ in range(READY_PERIODS):
+            self.period(Request=0, **changes)
 
     def start_at_full_current(self, **changes: float) -> dict[str, Any]:
         """Charging, with the limit on the current's growth behind it."""

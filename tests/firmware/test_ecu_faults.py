@@ -113,6 +113,20 @@ def test_a_symptom_of_one_period_is_forgiven(case: Case) -> None:
     assert bench.latched() == set()
 
 
+@pytest.mark.parametrize(
+    "case", [case for case in CASES if "not available" in case.name], ids=lambda case: case.name
+)
+def test_a_reading_that_is_not_available_is_named_and_not_the_decision_it_spoils(
+    case: Case,
+) -> None:
+    bench = Bench()
+    bench.start()
+    bench.follow_command = False
+    for _ in range(limit_periods(case.fault)):
+        bench.period(**case.changes)
+    assert bench.answer["FirstFault"] == case.fault
+
+
 def corrupted(data: bytes, byte: int, mask: int) -> bytes:
     changed = bytearray(data)
     changed[byte] ^= mask

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.firmware.bench import DATABASE, MEASURED, Bench
+from tests.firmware.bench import DATABASE, MEASURED, READY_PERIODS, STATES, Bench
 
 
 def test_before_all_measurements_came_it_stays_in_init_at_zero() -> None:
@@ -12,8 +12,14 @@ def test_before_all_measurements_came_it_stays_in_init_at_zero() -> None:
     for _ in range(20):
         bench.period(drop=("Coolant",), Request=0)
         assert (bench.state, bench.command_A) == ("Init", 0.0)
-    bench.period()
+    bench.get_ready()
     assert bench.state == "Standby"
+
+
+def test_init_lasts_until_every_message_came_often_enough() -> None:
+    bench = Bench()
+    states = [STATES[int(bench.period()["CommandState"])] for _ in range(READY_PERIODS)]
+    assert states == ["Init"] * (READY_PERIODS - 1) + ["Standby"]
 
 
 def test_a_node_that_never_comes_up_is_a_fault_after_start_up() -> None:
@@ -26,7 +32,7 @@ def test_a_node_that_never_comes_up_is_a_fault_after_start_up() -> None:
 
 def test_charging_begins_at_the_edge_of_the_request() -> None:
     bench = Bench()
-    bench.period(Request=0)
+    bench.get_ready()
     assert (bench.state, bench.command_A) == ("Standby", 0.0)
     bench.period(Request=1)
     assert bench.state == "Charging"
@@ -65,7 +71,8 @@ def test_an_ecu_that_starts_in_mid_charge_waits_for_the_edge() -> None:
     bench = Bench()
     for _ in range(30):
         bench.period(Request=1)
-        assert (bench.state, bench.command_A) == ("Standby", 0.0)
+        assert bench.command_A == 0.0
+    assert bench.state == "Standby"
 
 
 def test_charge_is_complete_at_the_completion_state_of_charge_and_stays_off() -> None:

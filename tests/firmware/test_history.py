@@ -13,7 +13,7 @@ from bms.data.measurements import Measurements
 from bms.firmware import Ecu
 from bms.kan.lags import Lag
 from bms.kan.model_file import shipped_model_path
-from tests.firmware.bench import Bench
+from tests.firmware.bench import READY_PERIODS, Bench
 
 LAGS = (
     Lag("current_squared_A2", 10.0),
@@ -55,7 +55,8 @@ def test_filters_keep_to_double_precision_through_a_long_charge() -> None:
     expected = oracle.samples(LAGS).inputs[:, 4:]
     history, model = ffi.new("history_t *"), model_in_c()
     for row in range(rows):
-        lib.history_step(history, model, float(current_A[row]), float(surface_K[row]), True)
+        flowed_A = float(current_A[row - 1]) if row else 0.0
+        lib.history_step(history, model, flowed_A, float(surface_K[row]), True)
         if row % 500 == 0:
             assert list(history.filtered)[:2] == pytest.approx(expected[row, :2], abs=0.05)
             assert list(history.filtered)[2:] == pytest.approx(expected[row, 2:], abs=2e-4)
@@ -97,7 +98,7 @@ def test_a_longer_gap_starts_the_history_anew_and_never_reads_as_settling_withou
 
 def test_ecu_with_memory_stays_in_init_until_its_filters_have_settled() -> None:
     bench = bench_with_memory()
-    for _ in range(SETTLING_PERIODS - 1):
+    for _ in range(READY_PERIODS + SETTLING_PERIODS - 2):
         bench.period(Request=0)
         assert (bench.state, bench.command_A) == ("Init", 0.0)
         assert bench.answer["InDomain"] == 0
@@ -110,7 +111,8 @@ def test_ecu_with_memory_stays_in_init_until_its_filters_have_settled() -> None:
 
 def test_ecu_with_memory_gives_no_current_after_a_gap_until_settled_again() -> None:
     bench = bench_with_memory()
-    for _ in range(SETTLING_PERIODS):
+    bench.get_ready()
+    for _ in range(SETTLING_PERIODS - 1):
         bench.period(Request=0)
     bench.period(Request=1)
     assert bench.period()["CommandCurrent"] < 0.0
@@ -121,10 +123,32 @@ def test_ecu_with_memory_gives_no_current_after_a_gap_until_settled_again() -> N
         bench.period(Request=0)
         assert bench.command_A == 0.0
         waited += 1
-    # The first frame after the gap only brings the message counter up to date.
-    assert waited == SETTLING_PERIODS + 1
+    # The first frame after the gap only brings the message counter up to date, and the message is
+    # not valid again before the fourth good one.
+    assert waited == 1 + 3 + SETTLING_PERIODS
     bench.period(Request=1)
     assert bench.state == "Charging"
+
+
+@pytest.mark.parametrize("lost", [1, 2])
+def test_frames_lost_while_settling_are_bridged_and_change_nothing(lost: int) -> None:
+    """Three in a row are a fault of their own."""
+    bench = bench_with_memory()
+    for period in range(READY_PERIODS + SETTLING_PERIODS - 2):
+        bench.period(drop=("CellThermal",) if 50 <= period < 50 + lost else (), Request=0)
+        assert (bench.state, bench.latched()) == ("Init", set())
+    bench.period(Request=0)
+    assert bench.state == "Standby"
+
+
+def test_faults_are_seen_while_the_filters_settle() -> None:
+    bench = bench_with_memory()
+    bench.period(Request=0)
+    for _ in range(3):
+        bench.period(Voltage=4.6, SurfaceTemperature=336.0)
+        assert bench.command_A == 0.0
+    assert bench.state == "Fault"
+    assert {13, 15} <= bench.latched()
 
 
 def test_silence_from_the_start_is_a_fault_and_not_an_endless_start() -> None:

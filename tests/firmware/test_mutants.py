@@ -32,6 +32,7 @@ class Mutant:
 DECISION, STATES = "tests/firmware/test_rcbf.py", "tests/firmware/test_ecu_states.py"
 HISTORY, THERMAL = "tests/firmware/test_history.py", "tests/firmware/test_thermal.py"
 FAULTS, ESTIMATE = "tests/firmware/test_ecu_faults.py", "tests/firmware/test_kan.py"
+NETWORK, PROTECTION = "tests/firmware/test_supervision.py", "tests/firmware/test_e2e.py"
 MARGINS = "names_the_constraint"
 
 MUTANTS = [
@@ -46,6 +47,7 @@ MUTANTS = [
     Mutant("combinations never seen are flagged", "kan.c", "is_in_slabs(model, nodes) && ", "", ESTIMATE, "combination"),
     Mutant("filters are trusted only when settled", "history.c", "history->periods >= model->settling_periods", "history->periods >= 0u", HISTORY, "init_until"),
     Mutant("an ECU with memory waits in init", "bms.c", "if (history_is_settling(", "if (!history_is_settling(", HISTORY, "init_until"),
+    Mutant("faults are seen while filters settle", "bms.c", "symptoms & ~bit_if(true, FAULT_OUT_OF_DOMAIN)", "0u", HISTORY, "faults_are_seen"),
     Mutant("a gap starts the history anew", "history.c", "bridged > HISTORY_MAX_BRIDGED", "bridged > 9999u", HISTORY, "gap"),
     Mutant("filters are deaf to what is no number", "history.c", "is_usable && numeric_is_finite(current_A) &&", "is_usable ||", HISTORY, "bridged"),
     Mutant("a surface colder than the heat allows is a fault", "bms.c", "limits->surface_deficit_K),", "9999.0f),", FAULTS, "colder"),
@@ -54,9 +56,17 @@ MUTANTS = [
     Mutant("the heat stands in for a sensor that reads cold", "bms.c", "bms->surface_temperature_K = coldest_K;", "(void)0;", STATES, "stands_in"),
     Mutant("a latched fault ends the charge", "bms.c", "bms->state = BMS_FAULT;\n    }\n    const", "bms->state = bms->state;\n    }\n    const", FAULTS, "stops_the_charge"),
     Mutant("a symptom stops at once", "bms.c", "!bms->monitor.stop &&", "", FAULTS, "stops_the_charge"),
-    Mutant("silence is noticed", "bms.c", "bms->inbox[i].fresh = false;", "(void)0;", FAULTS, "lost"),
+    Mutant("silence is noticed", "e2e.c", "receiver->is_good = false;", "(void)0;", FAULTS, "lost"),
     Mutant("the CRC is checked", "e2e.c", "if (data[0] != e2e_crc(data, length, data_ids))", "if (length == 0u)", FAULTS, "corrupted_byte"),
-    Mutant("the counter is checked", "e2e.c", "if (started && (jump == 0u))", "if (started && (jump == 99u))", FAULTS, "masquerader"),
+    Mutant("the counter is checked", "e2e.c", "(steps == 0u) ||", "(steps == 99u) ||", FAULTS, "masquerader"),
+    Mutant("what is not valid is not used", "e2e.c", "receiver->is_good && (receiver->state == E2E_VALID)", "receiver->is_good", NETWORK, "every_other or before_they"),
+    Mutant("a message often damaged loses trust", "e2e.c", "&& (bad <= policy->valid.max_bad)", "", NETWORK, "beside_good"),
+    Mutant("trust has to be won back", "e2e.c", "(good >= policy->invalid.min_good)", "receiver->is_good", NETWORK, "every_other"),
+    Mutant("a frame that comes late is refused", "e2e.c", "else if (steps <= max_delta_counter)", "else if (steps <= 15u)", PROTECTION, "comes_late"),
+    Mutant("counts do not wrap", "e2e.c", "(frames < room) ? frames : room", "frames", PROTECTION, "maximum"),
+    Mutant("a count is its own message's", "bms.c", "receivers[reported].counts", "receivers[0].counts", NETWORK, "its_message_and_kind"),
+    Mutant("a reading not available keeps its own name", "bms.c", "!monitor_stops(symptoms) && is_charging(bms)", "is_charging(bms)", FAULTS, "is_named"),
+    Mutant("codes do not wrap", "codec.c", "(value < all_ones) ? value : all_ones", "value", "tests/firmware/test_codec_messages.py", "reads_back"),
     Mutant("the reference has a ceiling", "bms.c", "(grown_A < strongest_A) ? strongest_A :", "", STATES, "reference"),
     Mutant("growth is limited", "bms.c", "(asked_A < allowed_A) ? allowed_A", "(asked_A < strongest_A) ? strongest_A", STATES, "grows"),
     Mutant("a charge needs the edge", "bms.c", "bms->may_start && (symptoms", "(symptoms", STATES, "edge"),

@@ -142,7 +142,7 @@ def test_series_agree_with_the_summary(preset):
     assert len(series.time_s) == summary.steps
     assert series.time_s[5] == 0.0
     assert series.current_A[:5] == [0.0] * 5
-    assert series.state[:5] == ["standby"] * 5
+    assert series.state[:5] == ["init"] * 2 + ["standby"] * 3
     derated_at = series.time_s.index(summary.first_derate_s)
     assert set(series.state[5:derated_at]) == {"charging"}
     assert series.state[derated_at] == "derated"

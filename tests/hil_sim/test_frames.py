@@ -18,6 +18,7 @@ DATABASE = cantools.database.load_string(
 )
 PLANT = ["CellElectrical", "CellThermal", "Coolant", "ChargeRequest", "SYNC"]
 ECU = ["Estimate", "Decision", "DecisionMargins", "Diagnostics", "ChargeCommand"]
+NOW_AND_THEN = ["Identity", "NetworkDiagnostics"]
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,7 @@ def periods(run):
 
 def test_every_period_has_the_same_messages_in_the_same_order(periods):
     for period in periods:
-        assert [name for name in period if name != "Identity"] == PLANT + ECU
+        assert [name for name in period if name not in NOW_AND_THEN] == PLANT + ECU
 
 
 def test_time_stamps_are_multiples_of_the_control_period(run, preset):
@@ -51,7 +52,7 @@ def test_time_stamps_are_multiples_of_the_control_period(run, preset):
     assert times == pytest.approx([k * period_s for k in range(len(times))], abs=1e-9)
 
 
-@pytest.mark.parametrize("name", [name for name in PLANT + ECU if name != "SYNC"])
+@pytest.mark.parametrize("name", [*PLANT[:-1], *ECU, "NetworkDiagnostics"])
 def test_end_to_end_protection_is_right_on_every_frame(run, name):
     message = DATABASE.get_message_by_name(name)
     data_ids = bytes.fromhex(message.dbc.attributes["E2EProfile2DataIdList"].value)
@@ -104,3 +105,11 @@ def test_counted_and_true_state_of_charge_agree(run):
 def test_no_fault_is_reported(periods):
     assert {period["Diagnostics"]["ActiveFaults"] for period in periods[1:]} == {0}
     assert {period["Diagnostics"]["LatchedFaults"] for period in periods} == {0}
+
+
+def test_every_message_of_an_undisturbed_run_is_reported_as_valid_without_a_count(periods):
+    reports = [p["NetworkDiagnostics"] for p in periods if "NetworkDiagnostics" in p]
+    assert [r["ReportedMessage"] for r in reports[:8]] == [0, 1, 2, 3, 0, 1, 2, 3]
+    assert {r["ReportedState"] for r in reports[1:]} == {2}
+    counts = ("WrongCrcFrames", "WrongLengthFrames", "RepeatedFrames", "LostFrames")
+    assert {r[name] for r in reports for name in (*counts, "ReorderedFrames")} == {0}

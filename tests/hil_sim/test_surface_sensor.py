@@ -5,43 +5,21 @@ from __future__ import annotations
 import pytest
 
 from hil_sim.disturbances import DisturbanceKind
-from hil_sim.sensors import Readings, SensorSuite
+from hil_sim.faults import parse_fault
 from hil_sim.session import Settings, run_both
 
 SURFACE_DEFICIT, OUT_OF_DOMAIN, CORE_TOO_HOT = 19, 10, 14
-BUS_STEP_K = 0.005
-
-
-class FailingSurfaceSensor(SensorSuite):
-    """From `since_s` on the reading drifts; without a drift it stays where it was."""
-
-    since_s = 0.0
-    drift_K_per_s: float | None = None
-    period_s = 0.1
-
-    def __init__(self, *arguments) -> None:
-        super().__init__(*arguments)
-        self._time_s = 0.0
-        self._last_K = 0.0
-
-    def read(self, truth: Readings) -> Readings:
-        readings = super().read(truth)
-        self._time_s += self.period_s
-        if self._time_s < self.since_s:
-            self._last_K = readings.surface_temperature_K
-            return readings
-        if self.drift_K_per_s is None:
-            return readings._replace(surface_temperature_K=self._last_K)
-        off_K = self.drift_K_per_s * (self._time_s - self.since_s)
-        wrong_K = BUS_STEP_K * round((readings.surface_temperature_K + off_K) / BUS_STEP_K)
-        return readings._replace(surface_temperature_K=wrong_K)
 
 
 def charge(preset, since_s, drift_K_per_s=None, disturbance=DisturbanceKind.NONE):
-    sensor = type(
-        "Sensor", (FailingSurfaceSensor,), {"since_s": since_s, "drift_K_per_s": drift_K_per_s}
-    )
-    return run_both(Settings(preset, disturbance=disturbance), sensor_factory=sensor)
+    """A charge with a reading that drifts from a time on; without a drift it stays where it was."""
+    fault = {"sensor": "surface_temperature_K", "from_s": since_s}
+    if drift_K_per_s is None:
+        fault |= {"kind": "sensor-stuck"}
+    else:
+        fault |= {"kind": "sensor-drifting", "rate_per_s": drift_K_per_s}
+    faults = (parse_fault(fault, "test"),)
+    return run_both(Settings(preset, disturbance=disturbance, faults=faults))
 
 
 @pytest.mark.parametrize("since_s", [5.0, 120.0])

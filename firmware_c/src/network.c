@@ -1,0 +1,38 @@
+#include "network.h"
+
+#include "can_catalog.h"
+
+typedef char received_messages_agree[(NETWORK_MESSAGES == CAN_RECEIVED_COUNT) ? 1 : -1];
+
+void network_receive(network_t *network, const can_frame_t *frame,
+                     codec_measurement_t *measurement)
+{
+    for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
+        const codec_message_t *message = &CAN_RECEIVED[i];
+        if ((frame->id == message->id) &&
+            (e2e_check(&network->receivers[i], frame->data, frame->length, message->length,
+                       message->data_ids, message->policy.max_delta_counter) == E2E_OK)) {
+            codec_read(i, frame->data, measurement);
+        }
+    }
+}
+
+void network_step(network_t *network)
+{
+    network->is_disturbed = false;
+    for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
+        const e2e_verdict_t verdict =
+            e2e_supervise(&network->receivers[i], &CAN_RECEIVED[i].policy);
+        network->is_usable[i] = verdict.is_usable;
+        network->is_disturbed = network->is_disturbed || verdict.is_disturbed;
+    }
+}
+
+bool network_is_valid(const network_t *network)
+{
+    bool is_valid = true;
+    for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
+        is_valid = is_valid && (network->receivers[i].state == E2E_VALID);
+    }
+    return is_valid;
+}

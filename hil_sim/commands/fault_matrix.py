@@ -1,0 +1,149 @@
+"""`bms fault-matrix`: every row of the fault matrix in closed loop."""
+
+from __future__ import annotations
+
+import json as json_format
+import os
+import sys
+import time
+from contextlib import nullcontext
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.errors import InputError
+from bms.firmware.calibration import load_pair
+from hil_sim.commands import options
+from hil_sim.faults.matrix import Row, load_matrix
+from hil_sim.faults.report import (
+    MatrixResult,
+    expected_text,
+    latch_text,
+    matrix_json,
+    matrix_junit,
+    matrix_page,
+)
+from hil_sim.faults.runner import MatrixSettings, play_all
+from hil_sim.faults.verdict import Verdict
+from hil_sim.report.folder import OutputFolder
+
+
+def fault_matrix(
+    bus: options.BusOption = "virtual:faults",
+    preset: options.PresetOption = options.DEFAULT_PRESET,
+    model: options.ModelOption = None,
+    seed: options.SeedOption = 0,
+    rows: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--rows",
+            help="Rows whose name contains this; * and ? stand for others. May be repeated. "
+            "Default: all.",
+        ),
+    ] = None,
+    matrix: Annotated[
+        Path | None,
+        typer.Option("--matrix", help="TOML file of rows. Default: hil_sim/faults/matrix.toml."),
+    ] = None,
+    jobs: Annotated[
+        int,
+        typer.Option("--jobs", min=1, help="Rows at a time on a virtual bus. Default: one a core."),
+    ] = os.cpu_count() or 1,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            help="Folder for fault-matrix.html, .json and junit.xml. Default: nothing is written.",
+        ),
+    ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print the result as JSON and nothing else.")
+    ] = False,
+) -> int:
+    """Play every row of the fault matrix and compare reaction, deadline and limits.
+
+    Each row is a charge with one fault, on a bus with plant and firmware in this process. Deadlines
+    are in control periods from the fault's first one, which is number 1. Exit code 1 when a row
+    does not go as it says, or a limit of the plant is crossed.
+
+    Example: bms fault-matrix --rows corrupted --out out/faults
+    """
+    settings = MatrixSettings(*load_pair(preset, model), bus, seed)
+    chosen = _chosen(load_matrix(matrix), rows)
+    with OutputFolder(out) if out is not None else nullcontext() as folder:
+        start_s = time.perf_counter()
+        verdicts = _play(settings, chosen, jobs)
+        result = MatrixResult(settings, verdicts, time.perf_counter() - start_s)
+        content = json_format.dumps(matrix_json(result), indent=2) + "\n"
+        if folder is not None:
+            folder.path("fault-matrix.json").write_text(content, encoding="utf-8")
+            folder.path("junit.xml").write_text(matrix_junit(result), encoding="utf-8")
+            folder.path("fault-matrix.html").write_text(matrix_page(result), encoding="utf-8")
+            folder.commit()
+    if json:
+        print(content, end="")
+    else:
+        _print(Console(), result, out)
+    return EXIT_CHECK_FAILED if result.red else EXIT_DONE
+
+
+def _chosen(rows: tuple[Row, ...], patterns: list[str] | None) -> list[Row]:
+    """Rows that any pattern names, in the order of the matrix; each pattern must name one."""
+    if not patterns:
+        return list(rows)
+    found: set[str] = set()
+    for pattern in patterns:
+        named = {row.name for row in rows if fnmatchcase(row.name.lower(), f"*{pattern.lower()}*")}
+        if not named:
+            raise InputError(f"--rows '{pattern}': no row has such a name; leave it out to see all")
+        found |= named
+    return [row for row in rows if row.name in found]
+
+
+def _play(settings: MatrixSettings, rows: list[Row], jobs: int) -> list[Verdict]:
+    """Play with a bar of the rows done on a terminal."""
+    if not sys.stderr.isatty():
+        return play_all(settings, rows, jobs)
+    columns = (TextColumn("faults"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("faults", total=len(rows))
+        return play_all(settings, rows, jobs, lambda: bar.advance(task))
+
+
+def _print(console: Console, result: MatrixResult, out: Path | None) -> None:
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1), title_justify="left")
+    table.title = escape(f"Fault matrix of '{result.settings.preset.name}'")
+    for name, justify in (
+        ("fault", "left"),
+        ("expected", "left"),
+        ("first 0 A", "right"),
+        ("latches", "left"),
+        ("latched", "right"),
+    ):
+        table.add_column(name, justify=justify)  # type: ignore[arg-type]
+    for verdict in result.verdicts:
+        cells = (
+            verdict.row.name,
+            expected_text(verdict),
+            str(verdict.first_zero_period or "-"),
+            latch_text(verdict),
+            str(verdict.latched_period or "-"),
+        )
+        table.add_row(*map(escape, cells), style="" if verdict.passed else "red")
+    console.print(table)
+    for verdict in result.red:
+        failures = escape(f"{verdict.row.name}: {'; '.join(verdict.failures)}")
+        console.print(f"[red]{failures}[/red]", highlight=False)
+    style = "red" if result.red else "green"
+    seconds = f"{result.wall_time_s:.1f} s"
+    console.print(f"[{style}]{result.sentence}[/{style}] ({seconds}); periods count from the fault")
+    if out is not None:
+        console.print(f"report: {out / 'fault-matrix.html'}", soft_wrap=True, markup=False)

@@ -1,0 +1,113 @@
+"""`bms replay`: a recorded log on the present firmware, or many logs on two builds of it."""
+
+from __future__ import annotations
+
+import json as json_format
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.errors import InputError
+from bms.firmware import Ecu
+from hil_sim.commands.options import JsonOption
+from hil_sim.commands.replay_output import ReplayReport, builds_json, print_builds
+from hil_sim.logs import usable_format
+from hil_sim.replay.builds import compare_builds, logs_in
+from hil_sim.replay.comparison import compare
+from hil_sim.replay.engine import replay as replay_recording
+from hil_sim.replay.engine import write_replayed
+from hil_sim.replay.identity import choose_pair, identity_to_ignore
+from hil_sim.replay.outcome import outcome
+from hil_sim.replay.recording import load_recording
+from hil_sim.replay.signals import Signals
+from hil_sim.report.folder import OutputFolder
+
+
+def replay(
+    log: Annotated[
+        Path,
+        typer.Argument(
+            help="Log as .log, .asc, .csv (also .gz), .blf or .mf4; a folder of them for --against."
+        ),
+    ],
+    preset: Annotated[
+        str | None,
+        typer.Option("--preset", help="Preset of the ECU. Default: the one that the log names."),
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option("--model", help="Model of the estimator. Default: the one the log names."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Log to write with the new answers. Default: none."),
+    ] = None,
+    against: Annotated[
+        tuple[Path, Path] | None,
+        typer.Option(
+            "--against",
+            help="Compare two builds made by 'python -m bms.firmware.build' on a folder of logs.",
+        ),
+    ] = None,
+    json: JsonOption = False,
+) -> int:
+    """Feed the frames of a log to the firmware in virtual time and compare its decisions.
+
+    Shows the first period in which what the ECU sends differs from the log, with measurements and
+    both sides' estimate, interval, margins and state, then the largest difference of each signal.
+    Exit code 1 when anything differs, 2 when a log cannot be used.
+
+    Example: bms replay out/run/can.log
+    """
+    if against is not None:
+        if out is not None:
+            raise InputError("--out: there are two answers with --against; leave one of them out")
+        return _against(against, log, preset, model, json)
+    return _replay(log, preset, model, out, json)
+
+
+def _replay(log: Path, preset: str | None, model: Path | None, out: Path | None, json: bool) -> int:
+    if out is not None:
+        usable_format(out)
+    recording = load_recording(log)
+    ecu = Ecu(*choose_pair(recording, preset, model))
+    answers = replay_recording(recording, ecu)
+    ignored = identity_to_ignore(recording, ecu.preset, ecu.model)
+    signals = Signals(recording.database)
+    comparison = compare(recording, signals, recording.answers, answers, ignored)
+    if out is not None:
+        with OutputFolder(out.parent) as folder:
+            write_replayed(folder.path(out.name), recording, answers)
+            folder.commit()
+    report = ReplayReport(
+        recording=recording,
+        signals=signals,
+        comparison=comparison,
+        outcomes=(
+            outcome(recording, signals, recording.answers),
+            outcome(recording, signals, answers),
+        ),
+        preset=ecu.preset.name,
+        model_hash=ecu.model.hash[:8],
+        is_identity_compared=not ignored,
+    )
+    if json:
+        print(json_format.dumps(report.to_json(), indent=2))
+    else:
+        report.print(Console())
+    return EXIT_DONE if comparison.is_equal else EXIT_CHECK_FAILED
+
+
+def _against(
+    builds: tuple[Path, Path], folder: Path, preset: str | None, model: Path | None, json: bool
+) -> int:
+    verdicts = compare_builds(builds, logs_in(folder), preset, model)
+    if json:
+        print(json_format.dumps(builds_json(builds, verdicts), indent=2))
+    else:
+        print_builds(Console(), builds, verdicts)
+    is_equal = all(verdict.comparison.is_equal for verdict in verdicts)
+    return EXIT_DONE if is_equal else EXIT_CHECK_FAILED

@@ -1,0 +1,195 @@
+"""What `bms replay` prints: JSON with units in its keys, or tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from hil_sim.database import Values
+from hil_sim.replay.builds import LogVerdict
+from hil_sim.replay.comparison import Comparison, PeriodDifference
+from hil_sim.replay.outcome import Outcome
+from hil_sim.replay.recording import Recording
+from hil_sim.replay.signals import Signals
+
+
+@dataclass(frozen=True)
+class ReplayReport:
+    """One replay and the firmware that it ran on; outcomes of the log, then of the replay."""
+
+    recording: Recording
+    signals: Signals
+    comparison: Comparison
+    outcomes: tuple[Outcome, Outcome]
+    preset: str
+    model_hash: str
+    is_identity_compared: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything, with units in the keys."""
+        comparison, signals = self.comparison, self.signals
+        recorded, replayed = self.outcomes
+        first = comparison.first
+        return {
+            "log": str(self.recording.path),
+            "preset": self.preset,
+            "model_hash": self.model_hash,
+            "identity_compared": self.is_identity_compared,
+            "lock_step": self.recording.lock_step,
+            "periods": comparison.periods,
+            "differing_periods": comparison.differing_periods,
+            "equal": comparison.is_equal,
+            "log_charge_Ah": recorded.charge_Ah,
+            "replay_charge_Ah": replayed.charge_Ah,
+            "first_difference": None if first is None else _first_json(first, signals),
+            "signals": _signals_json(comparison, signals),
+        }
+
+    def print(self, console: Console) -> None:
+        """The first difference and the largest ones, or that there is none."""
+        comparison = self.comparison
+        name = f"{self.recording.path}: {comparison.periods} periods on preset '{self.preset}'"
+        _say(console, f"{name}, model {self.model_hash}")
+        if not self.is_identity_compared:
+            _say(console, "its ECU had another preset or model, so Identity is not compared")
+        if comparison.first is None:
+            _say(console, "every frame of the ECU is the same")
+            return
+        share = f"{comparison.differing_periods} of {comparison.periods}"
+        _say(console, f"the ECU says something else in {share} periods")
+        console.print(_first_table(comparison.first, self.signals))
+        console.print(_largest_table(comparison, self.signals))
+        recorded, replayed = (side.charge_Ah for side in self.outcomes)
+        _say(console, f"charge commanded: {recorded:.5f} Ah in the log, {replayed:.5f} Ah now")
+
+
+def builds_json(builds: tuple[Path, Path], verdicts: Sequence[LogVerdict]) -> dict[str, Any]:
+    """Two builds on several logs."""
+    return {
+        "build_a": str(builds[0]),
+        "build_b": str(builds[1]),
+        "equal": all(verdict.comparison.is_equal for verdict in verdicts),
+        "logs": [_verdict_json(verdict) for verdict in verdicts],
+    }
+
+
+def print_builds(
+    console: Console, builds: tuple[Path, Path], verdicts: Sequence[LogVerdict]
+) -> None:
+    """A line for each log."""
+    _say(console, f"A: {builds[0]}")
+    _say(console, f"B: {builds[1]}, differences are B less A")
+    table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
+    table.add_column("log", no_wrap=True)
+    for heading in ("periods", "differ", "first", "current", "charge"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for verdict in verdicts:
+        comparison = verdict.comparison
+        first = comparison.first
+        table.add_row(
+            escape(verdict.log.name),
+            str(comparison.periods),
+            str(comparison.differing_periods),
+            "" if first is None else f"{first.time_s:.1f} s",
+            f"{verdict.largest_current_difference_A:.3f} A" if first else "",
+            f"{1000.0 * verdict.charge_difference_Ah:+.3f} mAh" if first else "",
+        )
+    console.print(table)
+    for verdict in verdicts:
+        for build, faults in (("A", verdict.gone_faults), ("B", verdict.new_faults)):
+            if faults:
+                _say(console, f"{verdict.log.name}: {build} alone raises {', '.join(faults)}")
+    differing = sum(not verdict.comparison.is_equal for verdict in verdicts)
+    _say(console, f"the builds differ on {differing} of {len(verdicts)} logs")
+
+
+def _say(console: Console, text: str) -> None:
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def _values_json(values: Values, signals: Signals) -> dict[str, float | None]:
+    return {signals.key(name): value for name, value in values.items()}
+
+
+def _first_json(first: PeriodDifference, signals: Signals) -> dict[str, Any]:
+    one, other = first.sides
+    return {
+        "period": first.period,
+        "time_s": first.time_s,
+        "differing_signals": list(first.signals),
+        "received": _values_json(first.received, signals),
+        "log": _values_json(one, signals),
+        "replay": _values_json(other, signals),
+    }
+
+
+def _signals_json(comparison: Comparison, signals: Signals) -> list[dict[str, Any]]:
+    return [
+        {
+            "signal": difference.signal,
+            "unit": signals.unit(difference.signal),
+            "differing_periods": difference.periods,
+            "largest_difference": difference.largest,
+        }
+        for difference in comparison.signals.values()
+    ]
+
+
+def _verdict_json(verdict: LogVerdict) -> dict[str, Any]:
+    comparison = verdict.comparison
+    first = comparison.first
+    return {
+        "log": verdict.log.name,
+        "periods": comparison.periods,
+        "differing_periods": comparison.differing_periods,
+        "first_difference_period": None if first is None else first.period,
+        "first_difference_s": None if first is None else first.time_s,
+        "first_differing_signals": [] if first is None else list(first.signals),
+        "largest_current_difference_A": verdict.largest_current_difference_A,
+        "charge_difference_Ah": verdict.charge_difference_Ah,
+        "new_faults": list(verdict.new_faults),
+        "gone_faults": list(verdict.gone_faults),
+    }
+
+
+def _first_table(first: PeriodDifference, signals: Signals) -> Table:
+    title = f"first difference: period {first.period}, {first.time_s:.3f} s"
+    table = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0))
+    table.add_column("")
+    for side in ("log", "replay"):
+        table.add_column(side, justify="right")
+    table.add_column("unit")
+    for name in first.received:
+        text = escape(signals.text(name, first.received))
+        table.add_row(f"got {name}", text, text, signals.unit(name))
+    table.add_section()
+    one, other = first.sides
+    for name in dict.fromkeys((*one, *other)):
+        cells = [escape(signals.text(name, side)) for side in (one, other)]
+        style = "bold red" if name in first.signals else None
+        mark = "*" if name in first.signals else " "
+        table.add_row(f"{mark} {name}", *cells, signals.unit(name), style=style)
+    for name in first.signals:
+        if name not in one and name not in other:
+            table.add_row(f"* {name}", "differs", "differs", style="bold red")
+    return table
+
+
+def _largest_table(comparison: Comparison, signals: Signals) -> Table:
+    table = Table(title="all differences", title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0))
+    table.add_column("")
+    for heading in ("periods", "largest"):
+        table.add_column(heading, justify="right")
+    table.add_column("unit")
+    for difference in comparison.signals.values():
+        largest = "" if difference.largest is None else f"{difference.largest:.6g}"
+        unit = signals.unit(difference.signal)
+        table.add_row(difference.signal, str(difference.periods), largest, unit)
+    return table

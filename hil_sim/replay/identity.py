@@ -1,0 +1,77 @@
+"""Which preset and model a recorded ECU had, by the hashes that it sent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bms.errors import InputError
+from bms.kan.model_file import KanModel, load_model, shipped_model_path, shipped_models
+from bms.presets import Preset, load_preset, preset_names
+from hil_sim.replay.recording import Recording
+
+IDENTITY = "Identity"
+
+
+def choose_pair(
+    recording: Recording, preset: str | None, model: Path | None
+) -> tuple[str, Path | None]:
+    """Preset and model as Ecu takes them: those given, else the shipped ones of the recorded ECU.
+
+    A preset that is given alone brings its own model. Raises InputError when the log does not
+    tell, or names hashes of something that does not ship.
+    """
+    if preset is not None:
+        return preset, model
+    model_hash, preset_hash = recorded_hashes(recording)
+    name = _shipped_preset(recording.path, preset_hash)
+    return name, _shipped_model(recording.path, model_hash, name) if model is None else model
+
+
+def identity_to_ignore(recording: Recording, preset: Preset, model: KanModel) -> tuple[int, ...]:
+    """Identifier of the Identity message when the replay was asked for another preset or model.
+
+    Then it differs by intent, and only what follows from that is of interest.
+    """
+    try:
+        model_hash, preset_hash = recorded_hashes(recording)
+    except InputError:
+        model_hash = preset_hash = "none"
+    is_same = model.hash.startswith(model_hash) and preset.hash.startswith(preset_hash)
+    return () if is_same else (recording.database[IDENTITY].frame_id,)
+
+
+def recorded_hashes(recording: Recording) -> tuple[str, str]:
+    """First hexadecimal digits of the model's and the preset's hash; InputError without them."""
+    codec = recording.database[IDENTITY]
+    for answer in recording.answers:
+        for frame in answer:
+            if frame.frame_id == codec.frame_id and (values := codec.decode(frame.data)):
+                return f"{_whole(values['ModelHash']):08x}", f"{_whole(values['PresetHash']):04x}"
+    raise InputError(
+        f"{recording.path}: no Identity frame is in it, so its ECU was not this firmware; "
+        "give --preset to replay it all the same"
+    )
+
+
+def _whole(value: float | None) -> int:
+    return int(value or 0)
+
+
+def _shipped_preset(path: Path, wanted: str) -> str:
+    for name in preset_names():
+        if load_preset(name).hash.startswith(wanted):
+            return name
+    raise InputError(
+        f"{path}: recorded with a preset of hash {wanted}..., which no shipped one has; "
+        "give it as --preset FILE"
+    )
+
+
+def _shipped_model(path: Path, wanted: str, preset: str) -> Path | None:
+    for candidate in shipped_models():
+        if load_model(candidate).hash.startswith(wanted):
+            return None if candidate == shipped_model_path(preset) else candidate
+    raise InputError(
+        f"{path}: recorded with a model of hash {wanted}..., which no shipped one has; "
+        "give it as --model FILE"
+    )

@@ -1,0 +1,84 @@
+"""docs/can.md says of every message, signal and fault what database and firmware say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bms.firmware._firmware import ffi, lib
+
+from codegen.can_database import data_ids, load_database, number_attribute
+from codegen.can_document import can_document
+
+DATABASE = load_database()
+MESSAGES = DATABASE.messages
+DOCUMENT = "\n" + can_document(Path(__file__).parents[2] / "firmware_c")
+
+
+def table(heading: str) -> dict[str, list[str]]:
+    """Cells of the rows of a section's table, by their first cell."""
+    section = DOCUMENT.split(f"\n{heading}\n")[1].split("\n#")[0]
+    rows = [line.strip("| ").split(" | ") for line in section.splitlines() if line[:2] == "| "]
+    return {row[0]: row for row in rows[1:]}
+
+
+@pytest.mark.parametrize("message", MESSAGES, ids=lambda m: m.name)
+def test_overview_has_the_facts_of_every_message(message: Any) -> None:
+    row = table("# The CAN bus")[f"0x{message.frame_id:03X}"]
+    cycle_ms = number_attribute(DATABASE, message, "GenMsgCycleTime")
+    timeout_ms = number_attribute(DATABASE, message, "MessageTimeoutTime")
+    assert row[1] == f"[{message.name}](#{message.name.lower()})"
+    assert row[2].startswith(message.senders[0].replace("PLANT", "plant"))
+    assert row[3:5] == [str(message.length), str(cycle_ms)]
+    assert (str(timeout_ms) in row[5:]) == (timeout_ms > 0)
+    assert ("profile 2" in row) == bool(data_ids(message))
+
+
+@pytest.mark.parametrize("message", [m for m in MESSAGES if m.signals], ids=lambda m: m.name)
+def test_every_signal_has_its_range_resolution_unit_and_pattern(message: Any) -> None:
+    rows = table(f"### {message.name}")
+    assert set(rows) == {signal.name for signal in message.signals}
+    for signal in message.signals:
+        _, bits, limits, resolution, *rest = rows[signal.name]
+        assert bits == f"{signal.start}…{signal.start + signal.length - 1}"
+        assert [float(x) for x in limits.split(" … ")] == [signal.minimum, signal.maximum]
+        assert float(resolution) == signal.scale
+        if signal.unit:
+            assert rest[0].strip() == signal.unit
+            assert int(rest[1].strip(" |"), 16) == 2**signal.length - 1
+        for value, name in (signal.choices or {}).items():
+            assert f"{value} = {name}" in rest[-1]
+
+
+def test_every_fault_has_its_policy_and_a_meaning() -> None:
+    rows, policies = table("## Fault bits"), lib.host_fault_policies()
+    assert list(rows) == [str(fault) for fault in range(lib.FAULT_COUNT)]
+    for number, symbol in ffi.typeof("fault_t").elements.items():
+        _, name, meaning, at_once, periods = rows[str(number)]
+        assert name.upper().replace(" ", "_") == symbol.removeprefix("FAULT_")
+        assert meaning
+        assert at_once == ("yes" if policies[number].stops_at_once else "no")
+        assert int(periods) == policies[number].debounce_periods
+
+
+@pytest.mark.parametrize("message", [m for m in MESSAGES if data_ids(m)], ids=lambda m: m.name)
+def test_limits_of_the_supervision_can_be_met_and_kept(message: Any) -> None:
+    def number(name: str) -> int:
+        return number_attribute(DATABASE, message, name)
+
+    window = number("E2EWindowSize")
+    assert window <= lib.E2E_LONGEST_WINDOW
+    assert number("E2EMaxDeltaCounter") < lib.E2E_COUNTERS // 2
+    # Else a message would become valid and lose it again at once.
+    assert number("E2EMinOkStateValid") <= number("E2EMinOkStateInit") <= window
+    assert number("E2EMinOkStateValid") <= number("E2EMinOkStateInvalid") <= window
+    assert number("E2EMaxErrorStateInit") <= number("E2EMaxErrorStateValid") < window
+    assert number("E2EMaxErrorStateInvalid") <= number("E2EMaxErrorStateValid")
+
+
+def test_every_cycle_is_a_whole_number_of_control_periods() -> None:
+    period_ms = number_attribute(DATABASE, DATABASE.get_message_by_name("SYNC"), "GenMsgCycleTime")
+    for message in MESSAGES:
+        cycle_ms = number_attribute(DATABASE, message, "GenMsgCycleTime")
+        assert cycle_ms >= period_ms and cycle_ms % period_ms == 0, message.name

@@ -1,0 +1,1 @@
+"""Recorded scenarios that the firmware has to answer as it did; `record` makes them."""

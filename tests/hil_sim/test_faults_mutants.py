@@ -1,0 +1,57 @@
+"""A firmware that ignores one fault turns exactly the rows of the matrix red that rest on it."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from tests.hil_sim.test_faults_matrix import ROWS, is_quick
+
+ROOT = Path(__file__).parents[2]
+MATRIX = "tests/hil_sim/test_faults_matrix.py"
+NEVER = "{ 255u, false }"
+
+# Name of the fault, its row of the policy, and the message whose loss it stands for.
+IGNORED = [
+    ("thermal-missing", "[FAULT_THERMAL_MISSING] = { 3u, true }", "CellThermal"),
+    ("current-deviation", "[FAULT_CURRENT_DEVIATION] = { 3u, false }", None),
+    ("corrupted-frames", "[FAULT_CORRUPTED_FRAMES] = { 3u, false }", None),
+]
+
+
+def rests_on(row, name, message):
+    """Whether a row expects this fault, or the pause that its symptom makes."""
+    if row.expect.latches is not None:
+        return row.expect.latches == name
+    pauses = row.expect.reaction == "resumes" and row.expect.deadline_periods is not None
+    return pauses and message is not None and getattr(row.fault, "message", None) == message
+
+
+@pytest.mark.parametrize(("name", "policy", "message"), IGNORED, ids=lambda value: value)
+def test_exactly_the_rows_of_an_ignored_fault_are_red(name, policy, message, tmp_path):
+    tree = tmp_path / "tree"
+    shutil.copytree(ROOT / "firmware_c", tree / "firmware_c")
+    source = tree / "firmware_c" / "src" / "monitor.c"
+    text = source.read_text()
+    assert policy in text, "the mutant no longer applies; bring it up to date"
+    source.write_text(text.replace(policy, policy[: policy.index("{")] + NEVER))
+    python = [sys.executable, "-m"]
+    build = [*python, "bms.firmware.build", "--tree", str(tree), "--out", str(tmp_path / "out")]
+    subprocess.run(build, check=True, cwd=ROOT, capture_output=True)
+    run = [*python, "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", MATRIX]
+    run += ["--firmware-build", str(tmp_path / "out"), "-k", "test_quick_row"]
+    run += [f"--junitxml={tmp_path / 'junit.xml'}"]
+    result = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert result.returncode == 1, result.stdout[-2000:]
+    played = list(ElementTree.parse(tmp_path / "junit.xml").getroot().iter("testcase"))
+    quick = [row for row in ROWS if is_quick(row) and not row.realtime]
+    assert len(played) == len(quick)
+    red = {case.get("name") for case in played if len(case)}
+    expected = {row.name for row in quick if rests_on(row, name, message)}
+    assert expected
+    assert red == {f"test_quick_row[{row}]" for row in expected}

@@ -1,0 +1,127 @@
+"""Logs of every format give back what was written, except for the gaps that the format states."""
+
+import gzip
+import importlib.util
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bms.errors import InputError
+from hil_sim.logs import FORMATS, LogFrame, LogWriter, log_format, log_suffixes, read_log
+
+HAS_ASAMMDF = importlib.util.find_spec("asammdf") is not None
+MICROSECOND = 1e-6
+
+
+def needing_library(suffix: str):
+    marks = pytest.mark.skipif(not HAS_ASAMMDF, reason="not run: asammdf is not installed")
+    return pytest.param(suffix, marks=marks) if suffix == ".mf4" else suffix
+
+
+each_suffix = pytest.mark.parametrize("suffix", [needing_library(s) for s in log_suffixes()])
+
+identifiers = st.one_of(
+    st.tuples(st.sampled_from([0, 1, 0x7FF]) | st.integers(0, 0x7FF), st.just(False)),
+    st.tuples(st.sampled_from([0, 0x7FF, 0x800, 0x1FFFFFFF]) | st.integers(0, 0x1FFFFFFF))
+    .map(lambda chosen: (*chosen, True)),
+)  # fmt: skip
+gaps_us = st.lists(st.integers(0, 3_600_000_000) | st.just(0), min_size=1, max_size=12)
+
+
+@st.composite
+def logs(draw) -> list[LogFrame]:
+    time_us = draw(st.sampled_from([0, 1, 5_000_000, 1_700_000_000_123_457]))
+    frames = []
+    for gap_us in draw(gaps_us):
+        frame_id, is_extended = draw(identifiers)
+        data, received = draw(st.binary(max_size=8)), draw(st.booleans())
+        frames.append(LogFrame(time_us / 1e6, frame_id, data, is_extended, received))
+        time_us += gap_us
+    return frames
+
+
+def write(path: Path, frames: list[LogFrame]) -> Path:
+    with LogWriter(path) as writer:
+        for frame in frames:
+            writer.write(frame)
+    return path
+
+
+@each_suffix
+@settings(max_examples=25)
+@given(frames=logs())
+def test_what_is_written_is_read_back(tmp_path_factory, suffix, frames):
+    path = tmp_path_factory.mktemp("log") / f"can{suffix}"
+    form = log_format(path)
+
+    read = list(read_log(write(path, frames)))
+
+    assert [f[1:4] for f in read] == [f[1:4] for f in frames]
+    directions = [frame.received or not form.keeps_direction for frame in frames]
+    assert [frame.received for frame in read] == directions
+    if form.keeps_start:
+        assert [frame.time_s for frame in read] == [frame.time_s for frame in frames]
+    else:
+        since_start_s = [frame.time_s - frames[0].time_s for frame in frames]
+        read_s = [frame.time_s - read[0].time_s for frame in read]
+        assert read_s == pytest.approx(since_start_s, abs=MICROSECOND)
+
+
+@each_suffix
+def test_a_log_that_starts_at_zero_keeps_its_times_in_every_format(tmp_path, suffix):
+    frames = [LogFrame(round(0.1 * n, 6), 0x100 + n, bytes(n), received=True) for n in range(9)]
+    assert list(read_log(write(tmp_path / f"can{suffix}", frames))) == frames
+
+
+@pytest.mark.parametrize(
+    "suffix", [s for s in log_suffixes() if log_format(Path(f"x{s}")).is_reproducible]
+)
+def test_equal_frames_give_equal_bytes(tmp_path, suffix, monkeypatch):
+    frames = [LogFrame(0.1 * n, 0x100, bytes([n])) for n in range(100)]
+    one = write(tmp_path / f"one{suffix}", frames).read_bytes()
+    monkeypatch.setattr("time.time", lambda: 4e9)
+    assert write(tmp_path / f"other{suffix}", frames).read_bytes() == one
+
+
+def test_a_compressed_log_is_the_plain_one_compressed(tmp_path):
+    frames = [LogFrame(0.1, 0x100, b"\x01\x02", received=False)]
+    plain = write(tmp_path / "can.log", frames).read_bytes()
+    assert gzip.decompress(write(tmp_path / "can.log.gz", frames).read_bytes()) == plain
+    assert plain == b"(0.100000) vcan0 100#0102 T\n"
+
+
+@pytest.mark.parametrize("name", ["can", "can.txt", "can.gz", "can.blf.gz", "can.mf4.gz", "log"])
+def test_another_suffix_is_refused_and_the_known_ones_are_listed(tmp_path, name):
+    path = tmp_path / name
+    for use in (LogWriter, lambda path: list(read_log(path))):
+        with pytest.raises(InputError, match=r"\.log, \.asc, \.csv, \.blf, \.mf4, \.log\.gz"):
+            use(path)
+    assert not path.exists()
+
+
+def test_suffixes_are_read_whatever_their_case(tmp_path):
+    assert log_format(tmp_path / "CAN.LOG.GZ") is FORMATS[".log"]
+
+
+@pytest.mark.skipif(HAS_ASAMMDF, reason="not run: asammdf is installed")
+def test_a_format_without_its_library_says_what_to_install(tmp_path):
+    path = tmp_path / "can.mf4"
+    path.write_bytes(b"MDF     4.10    ")
+    with pytest.raises(InputError, match=r"pip install 'kan-rcbf-bms\[mf4\]'"):
+        list(read_log(path))
+    with pytest.raises(InputError, match=r"pip install 'kan-rcbf-bms\[mf4\]'"):
+        LogWriter(path)
+
+
+def test_the_table_of_formats_in_the_documentation_is_true():
+    lines = (Path(__file__).parents[2] / "docs" / "replay.md").read_text().splitlines()
+    rows = [
+        [cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("| .")
+    ]
+    stated = {row[0]: [cell == "yes" for cell in row[2:]] for row in rows}
+    assert stated == {
+        suffix: [form.is_text, form.keeps_direction, form.keeps_start, form.is_reproducible]
+        for suffix, form in FORMATS.items()
+    }
