@@ -44,7 +44,7 @@ models: .venv/runtime ## Train the shipped models anew (both presets, lagged too
 	  $(BIN)/bms train --preset $$preset --lagged --out bms/models/$${preset}_lagged.json || exit 1; done
 	$(BIN)/python -m codegen
 
-verify-tables: .venv/runtime ## Try all 2^32 arguments of every edge of the shipped models in C (some 15 minutes)
+verify-tables: .venv/runtime ## Try all 2^32 arguments of every edge of the shipped models in C (some 10 minutes)
 	$(BIN)/bms verify-tables --stride 1
 
 fuzz: .venv/tests ## 10^7 random and damaged frames through the ECU with sanitizers; SEED=n for others
