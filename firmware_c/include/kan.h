@@ -18,7 +18,7 @@
 #define KAN_MAX_LAGS 4
 #define KAN_MAX_DIRECTIONS 8
 
-/* Edges of a model are stored layer by layer, output by output, input by input; an edge has cells + 1 knots
+/* Edges are stored layer by layer, output by output, input by input; an edge has cells + 1 knots
  * and cells * KAN_CELL_COEFFICIENTS coefficients, constant term first. */
 typedef enum { KAN_CURRENT_SQUARED = 0, KAN_SURFACE_TEMPERATURE_RISE = 1 } kan_quantity_t;
 

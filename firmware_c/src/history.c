@@ -12,8 +12,7 @@ void history_step(history_t *history, const kan_model_t *model, float current_A,
 {
     const bool is_good = is_usable && numeric_is_finite(current_A) &&
                          numeric_is_finite(surface_temperature_K);
-    const bool is_in_gap = history->bridged > HISTORY_MAX_BRIDGED;
-    const uint32_t bridged = is_good ? 0u : (history->bridged + (is_in_gap ? 0u : 1u));
+    const uint32_t bridged = is_good ? 0u : (history->bridged + 1u);
     if ((bridged > HISTORY_MAX_BRIDGED) || ((bridged > 0u) && (history->periods == 0u))) {
         history_reset(history);
         history->bridged = HISTORY_MAX_BRIDGED + 1u;

@@ -9,6 +9,7 @@ import pytest
 
 from bms.kan import shipped_model_path
 from bms.presets import preset_path
+from tests.hil_sim.command_line import bms
 
 STABLE_KEYS = [
     "controller",
@@ -26,17 +27,6 @@ STABLE_KEYS = [
     "wall_time_s",
 ]
 HAS_VCAN = Path("/sys/class/net/vcan0").exists()
-
-
-def bms(*arguments, folder=None):
-    return subprocess.run(
-        [sys.executable, "-c", "from bms.cli import main; main()", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        cwd=folder,
-        check=False,
-    )
 
 
 def test_json_is_all_that_is_printed_and_has_the_stable_keys_first():

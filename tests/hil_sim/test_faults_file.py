@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from dataclasses import fields
 
 import pytest
@@ -14,6 +12,7 @@ from hypothesis import strategies as st
 from bms.errors import InputError
 from hil_sim.faults import load_faults, parse_fault
 from hil_sim.faults.plan import KINDS
+from tests.hil_sim.command_line import bms
 
 WHEN = "from_s = 1.5\n"
 EXAMPLES = {
@@ -156,17 +155,6 @@ def test_no_content_does_worse_than_being_refused(kind, content):
         assert str(error).startswith("here: ")
     else:
         assert len(fault.window(0.1)[:2]) >= 1
-
-
-def bms(*arguments, folder=None):
-    return subprocess.run(
-        [sys.executable, "-c", "from bms.cli import main; main()", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        cwd=folder,
-        check=False,
-    )
 
 
 def test_a_run_reports_what_was_injected_and_when(path, tmp_path):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from typing import get_args
 from xml.etree import ElementTree
@@ -19,6 +17,7 @@ from hil_sim.faults.matrix import Expectation, fault_numbers, load_matrix, matri
 from hil_sim.faults.plan import KINDS
 from hil_sim.faults.runner import MatrixSettings, play, play_all
 from hil_sim.faults.sensors import SensorName
+from tests.hil_sim.command_line import bms
 
 ROWS = load_matrix()
 SETTINGS = MatrixSettings(*load_pair(DEFAULT_PRESET, None), "virtual:matrix")
@@ -157,17 +156,6 @@ def test_the_same_seed_gives_the_same_verdict_over_any_number_of_jobs():
     assert [replace(v, wall_time_s=0) for v in alone] == [
         replace(v, wall_time_s=0) for v in together
     ]
-
-
-def bms(*arguments, folder=None):
-    return subprocess.run(
-        [sys.executable, "-c", "from bms.cli import main; main()", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        cwd=folder,
-        check=False,
-    )
 
 
 def test_the_command_writes_table_page_json_and_junit(tmp_path):

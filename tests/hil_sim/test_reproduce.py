@@ -3,8 +3,6 @@
 import csv
 import io
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import pytest
@@ -21,23 +19,13 @@ from hil_sim.reproduction.runs import Case, all_cases, run_case
 from hil_sim.reproduction.sections import BAD, passed, sections
 from hil_sim.result import RunResult
 from hil_sim.session import ControllerKind
+from tests.hil_sim.command_line import bms
 
 NAME = "paper_calibrated"
 PRESET = load_preset(NAME)
 PAPER = {figure.name: figure.paper for figure in FIGURES}
 SURFACE_MARGIN = next(margin for margin in MARGINS if margin.name == "sampling, surface")
 UNCERTAINTY = next(margin for margin in MARGINS if margin.name == "model uncertainty")
-
-
-def bms(*arguments, folder=None):
-    return subprocess.run(
-        [sys.executable, "-c", "from bms.cli import main; main()", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        cwd=folder,
-        check=False,
-    )
 
 
 @pytest.fixture(scope="module")
