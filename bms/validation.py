@@ -55,16 +55,18 @@ def read_text(path: Path) -> str:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Decoded TOML; InputError names file and line of a syntax error."""
+    text = read_text(path)
     try:
-        return tomllib.loads(read_text(path))
+        return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # numbers too long, nesting too deep as well
         raise InputError(f"{path}: not valid TOML: {error}; mend the file") from None
 
 
 def read_json(path: Path) -> Any:
     """Decoded JSON; InputError names file and line of a syntax error."""
+    text = read_text(path)
     try:
-        return json.loads(read_text(path))
+        return json.loads(text)
     except json.JSONDecodeError as error:
         raise InputError(f"{path}:{error.lineno}: not valid JSON: {error.msg}") from None
     except (ValueError, RecursionError) as error:  # a number too long, nesting too deep

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from bms.errors import InputError
 from bms.presets import DEFAULT_PRESET, load_preset, preset_names, preset_path
-from bms.validation import read_toml
+from bms.validation import read_json, read_toml
 
 CONTENT = read_toml(preset_path(DEFAULT_PRESET))
 MAY_BE_NEGATIVE = {"cell.entropic_coefficient_V_per_K", "limits.reference_current_A"}
@@ -215,3 +215,11 @@ def test_only_what_training_depends_on_makes_a_model_stale(load, path, value, sa
 def test_a_readings_error_bound_adds_bias_noise_and_rounding(bias, noise, resolution):
     sensor = type(load_preset("lin2014").sensors.current_A)(resolution, noise, bias)
     assert sensor.error_bound == pytest.approx(abs(bias) + 4.0 * noise + 0.5 * resolution)
+
+
+@pytest.mark.parametrize("read", [read_toml, read_json])
+def test_an_absent_file_is_told_once(tmp_path, read):
+    path = tmp_path / "absent"
+    with pytest.raises(InputError) as refusal:
+        read(path)
+    assert str(refusal.value) == f"{path}: no such file; check the path"
