@@ -169,7 +169,7 @@ static void update_estimates(bms_t *bms)
                                                   m->coolant_temperature_K };
     bms->estimate = history_estimate(&bms->history, &calibration->kan, measured);
     if (bms->soc_known) {
-        soc_count(&bms->soc, current_A, calibration->sampling_period_s,
+        soc_count(&bms->soc, current_A, bms->command_A, calibration->sampling_period_s,
                   calibration->rcbf.capacity_As);
     }
 }

@@ -27,7 +27,7 @@ _EACH_OF = {
 }
 
 Reaction = Literal["stops", "resumes", "restrains", "rides-through"]
-State = Literal["standby", "fault"]
+State = Literal["standby", "complete", "fault"]
 Periods = Annotated[int, Ge(1)]
 
 

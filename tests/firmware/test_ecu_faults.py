@@ -237,7 +237,7 @@ def test_an_invalid_decision_while_charging_is_a_fault() -> None:
     """No frame can bring the counter to NaN, so memory is damaged by hand."""
     bench = Bench()
     bench.start()
-    bench.ecu._state.soc.soc = math.nan
+    bench.ecu._state.soc.measured.soc = math.nan
     for _ in range(2):
         bench.period()
         assert bench.command_A == 0.0

@@ -128,13 +128,16 @@ def test_command_is_rounded_towards_zero() -> None:
             assert bench.command_A >= bench.answer["LowerCurrent"] - 0.0011
 
 
-def test_charge_is_counted_from_the_measured_current() -> None:
+@pytest.mark.parametrize("bias_A", [0.0, 0.5, -0.5])
+def test_charge_is_counted_from_the_stronger_of_reading_and_command(bias_A: float) -> None:
     bench = Bench()
     bench.start_at_full_current(PlugInStateOfCharge=0.3)
     before = bench.answer["StateOfCharge"]
     for _ in range(200):
-        bench.period()
-    assert bench.answer["StateOfCharge"] - before == pytest.approx(200 * 0.1 * 23 / 8280, abs=4e-5)
+        bench.period(Current=bench.command_A + bias_A)
+    stronger_A = 23.0 - min(bias_A, 0.0)
+    counted = bench.answer["StateOfCharge"] - before
+    assert counted == pytest.approx(200 * 0.1 * stronger_A / 8280, abs=4e-5)
 
 
 def test_every_message_of_the_database_is_received_or_sent() -> None:

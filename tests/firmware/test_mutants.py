@@ -71,6 +71,7 @@ MUTANTS = [
     Mutant("growth is limited", "bms.c", "(asked_A < allowed_A) ? allowed_A", "(asked_A < strongest_A) ? strongest_A", STATES, "grows"),
     Mutant("a charge needs the edge", "bms.c", "bms->may_start && (symptoms", "(symptoms", STATES, "edge"),
     Mutant("a charge ends when complete", "bms.c", "bms->state = BMS_COMPLETE;", "bms->state = BMS_CHARGING;", STATES, "complete"),
+    Mutant("the command is counted too", "soc.c", "? state->commanded.soc", "? state->measured.soc", STATES, "counted"),
     Mutant("a fault outlives its symptom", "monitor.c", "monitor->latched |= bit;", "monitor->latched = bit & symptoms;", FAULTS, "whatever_other"),
     Mutant("commands are rounded towards zero", "codec.c", "(value < 0.0f) ? (1.0f", "(value > 0.0f) ? (1.0f", "tests/firmware/test_codec.py", "towards_zero"),
 ]  # fmt: skip

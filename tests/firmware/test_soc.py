@@ -11,12 +11,12 @@ from bms.firmware._firmware import ffi, lib
 CAPACITY_AS, PERIOD_S = 8280.0, np.float32(0.1)
 
 
-def counted(start: float, currents_A: list[float]) -> float:
-    counter = ffi.new("soc_t *")
-    lib.soc_set(counter, start)
-    for current in currents_A:
-        lib.soc_count(counter, current, PERIOD_S, CAPACITY_AS)
-    return float(counter.soc)
+def counted(start: float, measured_A: list[float], commanded_A: list[float] | None = None) -> float:
+    state = ffi.new("soc_t *")
+    lib.soc_set(state, start)
+    for measured, commanded in zip(measured_A, commanded_A or measured_A):
+        lib.soc_count(state, measured, commanded, PERIOD_S, CAPACITY_AS)
+    return float(state.soc)
 
 
 @pytest.mark.parametrize("current_A", [-23.0, -2.3, -0.01, 5.0])
@@ -30,3 +30,19 @@ def test_a_long_count_of_small_steps_loses_nothing(current_A: float) -> None:
 
 def test_charging_raises_and_discharging_lowers() -> None:
     assert counted(0.5, [-10.0]) > 0.5 > counted(0.5, [10.0])
+
+
+def test_the_fuller_of_the_measured_and_the_commanded_count_holds() -> None:
+    weak, strong = [-10.0] * 100, [-10.5] * 100
+    alone = counted(0.5, strong)
+    assert counted(0.5, weak, strong) == counted(0.5, strong, weak) == alone > counted(0.5, weak)
+
+
+def test_currents_that_agree_in_the_long_run_count_once() -> None:
+    """A command that comes one period late, or noise, does not add up to charge that is not there."""
+    swinging = [-10.0, -20.0] * 500
+    late = swinging[1:] + swinging[:1]
+    one_period = 10.0 * float(PERIOD_S) / CAPACITY_AS
+    assert counted(0.1, swinging, late) == pytest.approx(
+        counted(0.1, swinging), abs=1.001 * one_period
+    )
