@@ -12,7 +12,6 @@ import jinja2
 import numpy as np
 
 from bms.errors import InputError
-from bms.tables import Double
 
 _INDENT = "    "
 _NUMBERS_PER_LINE = 4
@@ -55,8 +54,6 @@ def initialiser(value: Any, depth: int = 0) -> str:
             for i in range(0, len(numbers), _NUMBERS_PER_LINE)
         ]
         return "{\n" + "".join(lines) + _INDENT * depth + "}"
-    if isinstance(value, Double):
-        return repr(float(value))
     return f"{value}u" if isinstance(value, int) else float_literal(value)
 
 

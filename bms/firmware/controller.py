@@ -139,9 +139,9 @@ class Firmware:
         """
         problem = self._input
         problem.soc, problem.cooling_power_W = soc, cooling_power_W
-        problem.core_temperature_K = core_temperature_K
-        problem.surface_temperature_K = surface_temperature_K
-        problem.coolant_temperature_K = coolant_temperature_K
+        _set_temperature(problem.core_temperature_K, core_temperature_K)
+        _set_temperature(problem.surface_temperature_K, surface_temperature_K)
+        _set_temperature(problem.coolant_temperature_K, coolant_temperature_K)
         problem.reference_current_A = reference_current_A
         answer = lib.rcbf_solve(ffi.addressof(self._calibration.rcbf), problem)
         return Decision(
@@ -194,3 +194,9 @@ class Firmware:
                 "surface_margin_K_per_s2": margins.surface_K_per_s2,
             }
         )
+
+
+def _set_temperature(target: Any, temperature_K: float) -> None:
+    """Fill a rcbf_temperature_t: its first number rounds to float32, its second holds the rest."""
+    target.high_K = temperature_K
+    target.low_K = temperature_K - target.high_K

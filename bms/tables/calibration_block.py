@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from bms.barrier import barrier_constants, sampling_margins
 from bms.barrier.surface_prediction import surface_prediction
 from bms.errors import InputError, ModelMismatchError
@@ -18,14 +20,9 @@ from bms.kan.network import INPUT_NAMES
 from bms.presets import Preset
 from bms.tables.network_tables import network_tables
 
-LAYOUT = 2
+LAYOUT = 3
 """Layout number of bms_calibration_t that this module fills (BMS_CALIBRATION_LAYOUT)."""
 MAX_OCV_POINTS = 64
-
-
-class Double(float):
-    """A number that the firmware keeps in double precision; all others are float32."""
-
 
 _SENSOR_RANGES = {
     "surface_temperature_K": (223.0, 373.0),
@@ -106,31 +103,37 @@ def _barrier_fields(preset: Preset, error_bound_K: float) -> dict[str, Any]:
         "ohmic_resistance_ohm": cell.ohmic_resistance_ohm,
         "max_voltage_V": limits.max_voltage_V,
         "max_soc": limits.max_soc,
-        "max_core_temperature_K": Double(limits.max_core_temperature_K),
-        "max_surface_temperature_K": Double(limits.max_surface_temperature_K),
+        "max_core_temperature_K": _temperature_fields(limits.max_core_temperature_K),
+        "max_surface_temperature_K": _temperature_fields(limits.max_surface_temperature_K),
         "alpha1_per_s": gains.alpha1_per_s,
-        "alpha2_per_s": Double(gains.core_gain_per_s(cell)),
-        "alpha3_per_s2": Double(gains.alpha3_per_s2),
-        "a1_per_s": Double(constants.a1_per_s),
+        "alpha2_per_s": gains.core_gain_per_s(cell),
+        "alpha3_per_s2": gains.alpha3_per_s2,
+        "a1_per_s": constants.a1_per_s,
         "a2_per_As": constants.a2_per_As,
         "a3_K_per_A2s": constants.a3_K_per_A2s,
-        "a4_per_s2": Double(constants.a4_per_s2),
-        "a6_per_s2": Double(constants.a6_per_s2),
+        "a4_per_s2": constants.a4_per_s2,
+        "a6_per_s2": constants.a6_per_s2,
         "a8_per_As2": constants.a8_per_As2,
         "a9_K_per_A2s2": constants.a9_K_per_A2s2,
-        "a10_K_per_Ws2": Double(constants.a10_K_per_Ws2),
-        "delta4_K_per_s2": Double(constants.delta4_K_per_s2),
+        "a10_K_per_Ws2": constants.a10_K_per_Ws2,
+        "delta4_K_per_s2": constants.delta4_K_per_s2,
         "soc_uncertainty_per_s": preset.uncertainty.soc_per_s,
-        "core_uncertainty_K_per_s": Double(preset.uncertainty.core_K_per_s),
-        "estimation_error_bound_K": Double(error_bound_K),
+        "core_uncertainty_K_per_s": preset.uncertainty.core_K_per_s,
+        "estimation_error_bound_K": error_bound_K,
         "voltage_margin_V": margins.voltage_V,
         "soc_margin_per_s": margins.soc_per_s,
-        "core_margin_K_per_s": Double(margins.core_K_per_s),
-        "surface_margin_K_per_s2": Double(margins.surface_K_per_s2),
+        "core_margin_K_per_s": margins.core_K_per_s,
+        "surface_margin_K_per_s2": margins.surface_K_per_s2,
         "ocv_points": len(cell.ocv.soc),
         "ocv_soc": list(cell.ocv.soc),
         "ocv_V": list(cell.ocv.voltage_V),
     }
+
+
+def _temperature_fields(temperature_K: float) -> dict[str, float]:
+    """rcbf_temperature_t: what float32 cannot hold of a temperature is in a second number."""
+    high_K = float(np.float32(temperature_K))
+    return {"high_K": high_K, "low_K": temperature_K - high_K}
 
 
 def _thermal_fields(preset: Preset) -> dict[str, Any]:

@@ -117,7 +117,10 @@ def firmware_constants(preset: Preset, model: KanModel) -> dict[str, Any]:
     """The scalars that the firmware decides by, read back from its calibration block."""
     block = calibration_block(preset, model, compiled_in=False).rcbf
     names = [name for name in dir(block) if not name.startswith("ocv_")]
-    return {name: getattr(block, name) for name in names} | {
+    limits = ("max_core_temperature_K", "max_surface_temperature_K")
+    return {
+        **{name: getattr(block, name) for name in names if name not in limits},
+        **{name: getattr(block, name).high_K + getattr(block, name).low_K for name in limits},
         "core_error_term": ErrorTerm.ABSOLUTE,
         "surface_error_term": ErrorTerm.ABSOLUTE,
     }

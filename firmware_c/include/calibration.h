@@ -10,7 +10,7 @@
 #include "thermal.h"
 
 /* Raised whenever the layout of bms_calibration_t or of one of its parts changes. */
-#define BMS_CALIBRATION_LAYOUT 2
+#define BMS_CALIBRATION_LAYOUT 3
 
 typedef struct {
     float low;

@@ -13,25 +13,29 @@
 #define RCBF_MAX_OCV_POINTS 64
 #define RCBF_CONSTRAINTS 4
 
-/* Coefficients a1..a10 and delta4 as in bms/barrier/constants.py.
- *
- * The thermal constraints subtract temperatures near 300 K and terms that nearly cancel; where
- * little current is left, the step of float32 at 300 K (3e-5 K) would move the decision by tens of
- * milliamperes. Their constant terms are therefore double, about twenty operations a decision. */
+/* A temperature as a sum, because float32 near 300 K has steps of 3e-5 K: where little current is
+ * left, such a step moves the decision by tens of milliamperes. What comes in float32 already, as
+ * from a sensor, has no low part. */
 typedef struct {
-    double max_core_temperature_K;
-    double max_surface_temperature_K;
-    double alpha2_per_s;
-    double alpha3_per_s2;
-    double a1_per_s;
-    double a4_per_s2;
-    double a6_per_s2;
-    double a10_K_per_Ws2;
-    double delta4_K_per_s2;
-    double core_uncertainty_K_per_s;
-    double core_margin_K_per_s;
-    double surface_margin_K_per_s2;
-    double estimation_error_bound_K;
+    float high_K;
+    float low_K;
+} rcbf_temperature_t;
+
+/* Coefficients a1..a10 and delta4 as in bms/barrier/constants.py. */
+typedef struct {
+    rcbf_temperature_t max_core_temperature_K;
+    rcbf_temperature_t max_surface_temperature_K;
+    float alpha2_per_s;
+    float alpha3_per_s2;
+    float a1_per_s;
+    float a4_per_s2;
+    float a6_per_s2;
+    float a10_K_per_Ws2;
+    float delta4_K_per_s2;
+    float core_uncertainty_K_per_s;
+    float core_margin_K_per_s;
+    float surface_margin_K_per_s2;
+    float estimation_error_bound_K;
     float a2_per_As;
     float a3_K_per_A2s;
     float a8_per_As2;
@@ -50,9 +54,9 @@ typedef struct {
 } rcbf_constants_t;
 
 typedef struct {
-    double core_temperature_K; /* the estimate */
-    double surface_temperature_K;
-    double coolant_temperature_K;
+    rcbf_temperature_t core_temperature_K; /* the estimate */
+    rcbf_temperature_t surface_temperature_K;
+    rcbf_temperature_t coolant_temperature_K;
     float cooling_power_W;
     float soc;
     float reference_current_A;

@@ -91,10 +91,10 @@ static uint32_t symptoms_of_readings(const bms_t *bms)
     const float deviation_A = numeric_abs(m->current_A - bms->command_A);
     const float deviation_V = numeric_abs(m->voltage_V - model_V);
     const float core_limit_K =
-        (float)(cell->max_core_temperature_K + cell->estimation_error_bound_K) +
+        cell->max_core_temperature_K.high_K + cell->estimation_error_bound_K +
         limits->temperature_overshoot_K;
     const float surface_limit_K =
-        (float)cell->max_surface_temperature_K + limits->temperature_overshoot_K;
+        cell->max_surface_temperature_K.high_K + limits->temperature_overshoot_K;
 
     return bit_if(electrical && is_outside(m->current_A, &limits->current_A),
                   FAULT_CURRENT_RANGE) |
@@ -219,9 +219,9 @@ static void decide(bms_t *bms)
     if (is_charging(bms)) {
         const rcbf_input_t input = {
             .soc = bms->soc.soc,
-            .core_temperature_K = (double)bms->estimate.core_temperature_K,
-            .surface_temperature_K = (double)bms->surface_temperature_K,
-            .coolant_temperature_K = (double)m->coolant_temperature_K,
+            .core_temperature_K = { .high_K = bms->estimate.core_temperature_K },
+            .surface_temperature_K = { .high_K = bms->surface_temperature_K },
+            .coolant_temperature_K = { .high_K = m->coolant_temperature_K },
             .cooling_power_W = m->cooling_power_W,
             .reference_current_A = wanted_current_A(bms),
         };
@@ -274,7 +274,7 @@ static void queue_frames(bms_t *bms)
         .core_temperature_K = bms->estimate.core_temperature_K,
         .soc = bms->soc_known ? bms->soc.soc : NAN,
         .error_bound_K = (bms->calibration != NULL)
-                             ? (float)bms->calibration->rcbf.estimation_error_bound_K
+                             ? bms->calibration->rcbf.estimation_error_bound_K
                              : NAN,
         .in_domain = bms->estimate.in_domain ? 1u : 0u,
         .active_constraint = (uint8_t)bms->decision.active,

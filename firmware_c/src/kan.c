@@ -4,6 +4,7 @@
 
 /* An input on a face of the box may come out of the scaling this much outside. */
 #define KAN_FACE_TOLERANCE 1e-6f
+#define KAN_FACE (1.0f + KAN_FACE_TOLERANCE)
 
 static uint32_t edge_count(const kan_model_t *model)
 {
@@ -74,14 +75,18 @@ bool kan_model_is_valid(const kan_model_t *model)
                                        edges * model->cells * KAN_CELL_COEFFICIENTS);
 }
 
-float kan_edge_value(const kan_model_t *model, uint32_t edge, float x, bool *in_domain)
+/* False for NaN too. */
+static bool is_near(float value, float clamped)
 {
-    const uint32_t cells = model->cells;
-    const float *knots = &model->knots[edge * (cells + 1u)];
-    const float *coefficients = &model->coefficients[edge * cells * KAN_CELL_COEFFICIENTS];
+    const float beyond = value - clamped;
+    return (beyond <= KAN_FACE_TOLERANCE) && (beyond >= -KAN_FACE_TOLERANCE);
+}
+
+static inline float edge_value(const float *knots, const float *coefficients, uint32_t cells,
+                               float x, bool *in_domain)
+{
     const float clamped = numeric_clamp(x, knots[0], knots[cells]);
-    const float beyond = x - clamped;
-    if (!((beyond <= KAN_FACE_TOLERANCE) && (beyond >= -KAN_FACE_TOLERANCE))) {
+    if (!is_near(x, clamped)) {
         *in_domain = false;
     }
     uint32_t cell = 0u;
@@ -89,57 +94,69 @@ float kan_edge_value(const kan_model_t *model, uint32_t edge, float x, bool *in_
         cell++;
     }
     const float middle = 0.5f * (knots[cell] + knots[cell + 1u]);
-    const float distance = clamped - middle;
-    const float *polynomial = &coefficients[cell * KAN_CELL_COEFFICIENTS];
-    float value = polynomial[KAN_CELL_COEFFICIENTS - 1];
-    for (uint32_t i = KAN_CELL_COEFFICIENTS - 1u; i > 0u; i--) {
-        value = value * distance + polynomial[i - 1u];
-    }
-    return value;
+    const float d = clamped - middle;
+    const float *c = &coefficients[cell * KAN_CELL_COEFFICIENTS];
+    return ((((((c[7] * d + c[6]) * d + c[5]) * d + c[4]) * d + c[3]) * d + c[2]) * d + c[1]) * d +
+           c[0];
+}
+
+float kan_edge_value(const kan_model_t *model, uint32_t edge, float x, bool *in_domain)
+{
+    const uint32_t cells = model->cells;
+    return edge_value(&model->knots[edge * (cells + 1u)],
+                      &model->coefficients[edge * cells * KAN_CELL_COEFFICIENTS], cells, x,
+                      in_domain);
 }
 
 /* False for NaN, which compares with nothing. */
 static bool is_in_slabs(const kan_model_t *model, const float *normalised)
 {
-    bool inside = true;
-    for (uint32_t i = 0u; i < model->directions; i++) {
-        const kan_direction_t *direction = &model->direction[i];
+    const uint32_t inputs = model->width[0];
+    const kan_direction_t *end = &model->direction[model->directions];
+    for (const kan_direction_t *direction = model->direction; direction < end; direction++) {
         float along = 0.0f;
-        for (uint32_t k = 0u; k < model->width[0]; k++) {
-            along += direction->component[k] * normalised[k];
+        for (uint32_t i = 0u; i < inputs; i++) {
+            along += direction->component[i] * normalised[i];
         }
-        inside = inside && (along >= direction->low) && (along <= direction->high);
+        if (!((along >= direction->low) && (along <= direction->high))) {
+            return false;
+        }
     }
-    return inside;
+    return true;
 }
 
 kan_estimate_t kan_evaluate(const kan_model_t *model, const float *inputs)
 {
-    float nodes[KAN_MAX_WIDTH] = { 0.0f };
+    float normalised[KAN_MAX_WIDTH];
+    float layers[2][KAN_MAX_WIDTH];
+    float *nodes = layers[0];
+    float *sums = layers[1];
     kan_estimate_t estimate = { 0.0f, true };
     for (uint32_t i = 0u; i < model->width[0]; i++) {
-        nodes[i] = (inputs[i] - model->input_center[i]) * model->input_scale[i];
-        const float beyond = nodes[i] - numeric_clamp(nodes[i], -1.0f, 1.0f);
-        if (!((beyond <= KAN_FACE_TOLERANCE) && (beyond >= -KAN_FACE_TOLERANCE))) {
+        const float value = (inputs[i] - model->input_center[i]) * model->input_scale[i];
+        normalised[i] = value;
+        nodes[i] = numeric_clamp(value, -model->input_reach, model->input_reach);
+        if (!((value >= -KAN_FACE) && (value <= KAN_FACE))) {
             estimate.in_domain = false;
         }
     }
-    estimate.in_domain = is_in_slabs(model, nodes) && estimate.in_domain;
-    for (uint32_t i = 0u; i < model->width[0]; i++) {
-        nodes[i] = numeric_clamp(nodes[i], -model->input_reach, model->input_reach);
-    }
-    uint32_t edge = 0u;
+    estimate.in_domain = is_in_slabs(model, normalised) && estimate.in_domain;
+    const uint32_t cells = model->cells;
+    const float *knots = model->knots;
+    const float *coefficients = model->coefficients;
     for (uint32_t layer = 0u; layer < model->layers; layer++) {
-        float sums[KAN_MAX_WIDTH] = { 0.0f };
         for (uint32_t to = 0u; to < model->width[layer + 1u]; to++) {
+            float sum = 0.0f;
             for (uint32_t from = 0u; from < model->width[layer]; from++) {
-                sums[to] += kan_edge_value(model, edge, nodes[from], &estimate.in_domain);
-                edge++;
+                sum += edge_value(knots, coefficients, cells, nodes[from], &estimate.in_domain);
+                knots += cells + 1u;
+                coefficients += cells * KAN_CELL_COEFFICIENTS;
             }
+            sums[to] = sum;
         }
-        for (uint32_t i = 0u; i < KAN_MAX_WIDTH; i++) {
-            nodes[i] = sums[i];
-        }
+        float *const spent = nodes;
+        nodes = sums;
+        sums = spent;
     }
     estimate.core_temperature_K =
         model->output_center_K + model->output_half_range_K * nodes[0];

@@ -36,11 +36,12 @@ NETWORK, PROTECTION = "tests/firmware/test_supervision.py", "tests/firmware/test
 MARGINS = "names_the_constraint"
 
 MUTANTS = [
-    Mutant("core disturbance is subtracted", "rcbf.c", "k->core_uncertainty_K_per_s -", "0.0 -", DECISION, MARGINS),
-    Mutant("core margin is subtracted", "rcbf.c", "- k->core_margin_K_per_s", "+ k->core_margin_K_per_s", DECISION, MARGINS),
-    Mutant("surface margin counts", "rcbf.c", "            k->surface_margin_K_per_s2,", "            0.0,", DECISION, MARGINS),
-    Mutant("estimation error is taken at its worst", "rcbf.c", "branch[1].constant += p", "branch[1].constant -= p", DECISION, MARGINS),
-    Mutant("voltage limit decides", "rcbf.c", "constraints[0] = plain(voltage)", "constraints[0] = plain(soc)", DECISION, MARGINS),
+    Mutant("core disturbance is subtracted", "rcbf.c", "(k->core_uncertainty_K_per_s + k->", "(k->", DECISION, MARGINS),
+    Mutant("core margin is subtracted", "rcbf.c", " + k->core_margin_K_per_s)", ")", DECISION, MARGINS),
+    Mutant("surface margin counts", "rcbf.c", " + k->surface_margin_K_per_s2)", ")", DECISION, MARGINS),
+    Mutant("estimation error is taken at its worst", "rcbf.c", "nominal.constant + rest", "nominal.constant - rest", DECISION, MARGINS),
+    Mutant("temperatures are finer than float32", "rcbf.c", " + (a.low_K - b.low_K)", "", DECISION, "slsqp or osqp"),
+    Mutant("voltage limit decides", "rcbf.c", "k->max_voltage_V - rcbf_open_circuit", "k->max_voltage_V + rcbf_open_circuit", DECISION, MARGINS),
     Mutant("an empty interval gives 0 A", "rcbf.c", "decision.feasible ? decision.lower_A : 0.0f", "decision.lower_A", DECISION, "infeasible"),
     Mutant("not a number is refused", "rcbf.c", "if (!is_physical(input))", "if (input->reference_current_A > 0.0f)", DECISION, "no_number"),
     Mutant("extrapolation is flagged", "kan.c", "estimate.in_domain = false;", "estimate.in_domain = true;", ESTIMATE, "flagged"),

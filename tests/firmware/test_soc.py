@@ -39,7 +39,7 @@ def test_the_fuller_of_the_measured_and_the_commanded_count_holds() -> None:
 
 
 def test_currents_that_agree_in_the_long_run_count_once() -> None:
-    """A command that comes one period late, or noise, does not add up to charge that is not there."""
+    """A command one period late, or noise, does not add up to charge that is not there."""
     swinging = [-10.0, -20.0] * 500
     late = swinging[1:] + swinging[:1]
     one_period = 10.0 * float(PERIOD_S) / CAPACITY_AS

@@ -1,4 +1,4 @@
-"""A current sensor that is off by less than the monitor sees neither overfills the cell nor heats it."""
+"""A current sensor off by less than the monitor sees neither overfills nor overheats the cell."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ static void estimate(bench_t *bench, uint32_t period)
 
 static void decide(bench_t *bench, uint32_t period)
 {
-    bench->input.core_temperature_K += (double)period * 1e-9;
+    bench->input.core_temperature_K.low_K = (float)period * 1e-9f;
     bench->sink = rcbf_solve(&BMS_DEFAULT_CALIBRATION.rcbf, &bench->input).current_A;
 }
 
@@ -123,9 +123,9 @@ static void prepare(bench_t *bench)
     bench->measured[3] = values[VALUE_COOLANT];
     bench->input = (rcbf_input_t){
         .soc = bench->bms.soc.soc,
-        .core_temperature_K = (double)bench->bms.estimate.core_temperature_K,
-        .surface_temperature_K = (double)values[VALUE_SURFACE],
-        .coolant_temperature_K = (double)values[VALUE_COOLANT],
+        .core_temperature_K = { .high_K = bench->bms.estimate.core_temperature_K },
+        .surface_temperature_K = { .high_K = values[VALUE_SURFACE] },
+        .coolant_temperature_K = { .high_K = values[VALUE_COOLANT] },
         .cooling_power_W = values[VALUE_COOLING],
         .reference_current_A = values[VALUE_REFERENCE],
     };
