@@ -22,7 +22,7 @@ from bms.kan.network import Edge, Network
 
 Array = npt.NDArray[np.float64]
 
-MAX_LAYERS, MAX_WIDTH, MAX_KNOTS, MAX_COEFFICIENTS = 3, 8, 192, 512
+MAX_LAYERS, MAX_WIDTH, MAX_KNOTS, MAX_COEFFICIENTS = 3, 8, 128, 512
 MAX_LAGS, MAX_DIRECTIONS = 4, 8
 """The firmware's compile-time maxima (firmware_c/include/kan.h)."""
 CELL_COEFFICIENTS = 8
