@@ -13,7 +13,7 @@ SOURCES := $(wildcard firmware_c/*/*.[ch] $(RUNNER)/*.[ch] $(RIVALS)/*.[ch]) \
   bms/firmware/build.py bms/rivals/build.py hil_sim/campaign/build.py setup.py
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 C_WARNINGS := -std=c99 -pedantic -Wall -Wextra -Werror -Wconversion -Wdouble-promotion -Wmissing-prototypes
-C_INCLUDES := -Ifirmware_c/include -Ifirmware_c/src -Ifirmware_c/generated
+C_INCLUDES := $(addprefix -Ifirmware_c/, include src generated image boot port)
 
 .PHONY: help run test lint generate models verify-tables fuzz benchmark clean
 .DEFAULT_GOAL := help
@@ -32,7 +32,7 @@ lint: .venv/tests ## Types, style and C warnings
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	for source in firmware_c/src/*.c firmware_c/generated/*.c $(RUNNER)/*.c $(RIVALS)/*.c $(C_PROGRAMS)/*.c; do \
+	for source in $(foreach part, src generated image boot port, firmware_c/$(part)/*.c) $(RUNNER)/*.c $(RIVALS)/*.c $(C_PROGRAMS)/*.c; do \
 	  $(CC) $(C_WARNINGS) $(C_INCLUDES) -I$(RUNNER) -I$(RIVALS) -I$(C_PROGRAMS) -fsyntax-only $$source || exit 1; done
 
 generate: .venv/runtime ## Write firmware_c/generated anew from preset, model and CAN database
@@ -74,3 +74,5 @@ build/sanitized/done: .venv/tests $(SOURCES)
 	rm -rf build/sanitized
 	$(BIN)/python -m bms.firmware.build --sanitize --out build/sanitized
 	touch $@
+
+include firmware_c/firmware.mk

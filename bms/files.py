@@ -1,4 +1,4 @@
-"""Writing of single text files, at once or not at all."""
+"""Writing of single files, at once or not at all."""
 
 from __future__ import annotations
 
@@ -10,12 +10,17 @@ from bms.errors import InputError
 
 
 def write_text(path: Path, text: str) -> None:
+    """Write the file in UTF-8; InputError when that cannot be done."""
+    write_bytes(path, text.encode())
+
+
+def write_bytes(path: Path, content: bytes) -> None:
     """Write the file under another name and rename it; InputError when that cannot be done."""
     temporary: str | None = None
     try:
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".tmp")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
         Path(temporary).chmod(0o644)
         Path(temporary).replace(path)
     except OSError as error:

@@ -57,7 +57,7 @@ def initialiser(value: Any, depth: int = 0) -> str:
     return f"{value}u" if isinstance(value, int) else float_literal(value)
 
 
-def write_files(folder: Path, contents: Mapping[str, str]) -> list[Path]:
+def write_files(folder: Path, contents: Mapping[str, str | bytes]) -> list[Path]:
     """Write all files or none: they are completed under other names first and then renamed.
 
     Raises InputError when the folder cannot be written, or a folder stands where a file has to go.
@@ -68,11 +68,11 @@ def write_files(folder: Path, contents: Mapping[str, str]) -> list[Path]:
     staged: list[tuple[Path, Path]] = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, text in contents.items():
+        for name, content in contents.items():
             handle, temporary = tempfile.mkstemp(dir=folder, prefix=f".{name}.")
             staged.append((Path(temporary), folder / name))
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(text)
+            with os.fdopen(handle, "wb") as file:
+                file.write(content.encode() if isinstance(content, str) else content)
         for source, target in staged:
             source.chmod(0o644)
             source.replace(target)

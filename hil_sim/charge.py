@@ -11,6 +11,7 @@ from hil_sim.charger import Charger
 from hil_sim.faults import Injection
 from hil_sim.nodes.plant import NO_FAULT, Answer, PlantNode, Request
 from hil_sim.plant import Plant
+from hil_sim.refusal import refusal_text
 from hil_sim.result import (
     STOP_COMPLETE,
     STOP_FAULT,
@@ -52,6 +53,8 @@ class Charge:
     injection: Injection
     max_time_s: float
     ends_early: bool = True
+    model_hash: str | None = None
+    """The model that the ECU has to have; None for any."""
     progress: Progress = lambda soc: None
 
     def __post_init__(self) -> None:
@@ -67,9 +70,11 @@ class Charge:
     def run(self) -> str:
         """Run to the end and return why it ended.
 
-        Raises BusError when no ECU gets ready and ModelMismatchError when it has another preset.
+        Raises BusError when no ECU gets ready or its boot stage refuses the image, and
+        ModelMismatchError when it has another preset or model.
         """
         while True:
+            self.node.wait()
             self.injection.begin(self._charge_period, self.plant)
             answer = self.node.exchange(self.steps, self._measure(), self._request())
             self.plant.current_A = self.injection.supplied_A(
@@ -113,12 +118,14 @@ class Charge:
         """Switch the request on once the ECU is ready, not before OFF_PERIODS."""
         if self._edge is not None or self.steps < OFF_PERIODS:
             return
-        if answer.state == "standby":
+        is_known = self.model_hash is None or self.identity is not None
+        if answer.state == "standby" and is_known:
             self._edge = self.steps
         elif self.steps >= (STARTING_PERIODS if answer.state == "init" else READY_PERIODS):
             raise BusError(
-                f"the ECU is not ready after {self.steps} periods (state: {answer.state or 'none'})"
-                "; see the fault bits of its Diagnostics message"
+                f"the ECU is not ready after {self.steps} periods (state: {answer.state or 'none'}"
+                f"{'' if is_known else ', model unknown'}); "
+                "see the fault bits of its Diagnostics message"
             )
 
     def _note(self, answer: Answer) -> None:
@@ -133,11 +140,19 @@ class Charge:
             self.first_fault = int(fault)
         model, preset = answer.value("ModelHash"), answer.value("PresetHash")
         if model is not None and preset is not None:
+            if answer.value("FirmwareVersion") == 0:
+                raise BusError(f"the ECU does not start: {refusal_text(int(model))}")
             self.identity = Identity(f"{int(model):08x}", f"{int(preset):04x}")
             if not self.preset.hash.startswith(self.identity.preset):
                 raise ModelMismatchError(
                     f"the ECU runs a preset with hash {self.identity.preset}..., the plant "
                     f"'{self.preset.name}' with {self.preset.hash[:4]}...; give both one preset"
+                )
+            if self.model_hash is not None and not self.model_hash.startswith(self.identity.model):
+                raise ModelMismatchError(
+                    f"the ECU runs a model with hash {self.identity.model}..., not "
+                    f"{self.model_hash[:8]}...; build its image with that model, or name with "
+                    "--model the one that it has"
                 )
 
     def _stop_reason(self, answer: Answer) -> str | None:

@@ -72,14 +72,18 @@ class MessageCodec:
         payload[0] = profile2_crc(payload, self.data_ids[counter])
         return bytes(payload)
 
+    def is_intact(self, data: bytes) -> bool:
+        """Whether length and CRC are right."""
+        if len(data) != self.length:
+            return False
+        return not self.data_ids or data[0] == profile2_crc(data, self.data_ids[self.counter(data)])
+
     def decode(self, data: bytes) -> Values | None:
         """Values in the database's units, None for each that is not available.
 
         None as a whole when length or CRC is wrong.
         """
-        if len(data) != self.length:
-            return None
-        if self.data_ids and data[0] != profile2_crc(data, self.data_ids[self.counter(data)]):
+        if not self.is_intact(data):
             return None
         raw = self._message.decode(data, decode_choices=False, scaling=False)
         return {signal.name: signal.physical(raw[signal.name]) for signal in self._payload}

@@ -8,7 +8,9 @@ from typing import Any
 
 from bms.cell import CellState
 from hil_sim.faults.injection import InjectedFault
+from hil_sim.nodes.line_losses import LineLosses
 from hil_sim.nodes.plant import Answer
+from hil_sim.punctuality import PlantWatch, Timing
 
 
 @dataclass
@@ -86,6 +88,9 @@ class Summary:
     model_hash: str | None
     preset_hash: str
     faults: tuple[InjectedFault, ...] = ()
+    timing: Timing | None = None
+    line_losses: LineLosses | None = None
+    """Frames lost on the serial line to the ECU; None where there is no such line."""
 
     def to_json(self) -> dict[str, Any]:
         """Plain mapping in the order of the fields."""
@@ -96,6 +101,8 @@ class Summary:
     def failures(self) -> list[str]:
         """What is wrong with the run, one text each."""
         reasons = list(self.violations)
+        if self.line_losses is not None and self.line_losses.total:
+            reasons.append(str(self.line_losses))
         if self.stop_reason not in (STOP_COMPLETE, STOP_TIME_LIMIT):
             fault = "" if self.first_fault is None else f" {self.first_fault} (monitor.h)"
             reasons.append(f"run ended by {self.stop_reason}{fault}")
@@ -120,6 +127,8 @@ class RunResult:
 
     summary: Summary
     series: TimeSeries
+    watch: PlantWatch | None = None
+    """Every time behind the summary's timing; None where time was virtual."""
 
 
 def first_derate_s(series: TimeSeries) -> float | None:

@@ -28,13 +28,13 @@ class SensorSuite:
 
     def read(self, truth: Readings) -> Readings:
         """Reading of each channel: truth, bias and noise, rounded to the resolution."""
-        cutoff = Sensor.NOISE_CUTOFF
-        noise = np.clip(self._rng.standard_normal(len(truth)), -cutoff, cutoff).tolist()
-        return Readings(*map(_reading, self._channels, truth, noise))
+        normals = self._rng.standard_normal(len(truth)).tolist()
+        return Readings(*map(_reading, self._channels, truth, normals))
 
 
 def _reading(sensor: Sensor, truth: float, normal: float) -> float:
-    value = truth + sensor.bias + sensor.noise_std * normal
+    noise = sensor.noise_std * min(max(normal, -Sensor.NOISE_CUTOFF), Sensor.NOISE_CUTOFF)
+    value = truth + sensor.bias + noise
     if sensor.resolution == 0.0:
         return value
     return sensor.resolution * round(value / sensor.resolution)

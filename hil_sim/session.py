@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from threading import Event, Thread
@@ -17,7 +17,8 @@ from bms.errors import InputError
 from bms.firmware import Ecu
 from bms.kan.model_file import KanModel
 from bms.presets import Preset
-from hil_sim.bus import CanBus, open_bus, require_shared
+from bms.presets.schema import Initial
+from hil_sim.bus import CanBus, is_line, open_bus, require_room_for_ecu, require_shared
 from hil_sim.charge import Charge, Progress
 from hil_sim.charger import Charger
 from hil_sim.clock import WallClock
@@ -25,9 +26,11 @@ from hil_sim.database import MessageCodec, load_database
 from hil_sim.disturbances import DisturbanceKind, disturbance_source
 from hil_sim.faults import Fault, Injection
 from hil_sim.nodes.ecu import EcuLike, EcuNode
+from hil_sim.nodes.line_losses import LineLosses, LossWatch
 from hil_sim.nodes.plant import PlantNode
 from hil_sim.nodes.turns import LockStep, OnClock, PacedLockStep, Turn
 from hil_sim.plant import SUB_STEPS, Plant
+from hil_sim.punctuality import PlantWatch
 from hil_sim.python_ecu import PythonEcu
 from hil_sim.recorder import Recorder
 from hil_sim.result import (
@@ -43,6 +46,8 @@ from hil_sim.sensors import SensorSuite
 from hil_sim.views import BusMeasurements, TrueState
 
 ANSWER_TIMEOUT_S = 1.0
+LINE_ANSWER_TIMEOUT_S = 3.0
+"""An emulated board has to start first, and shares the machine with others."""
 
 
 class ControllerKind(str, Enum):
@@ -77,6 +82,8 @@ class Settings:
     answer_timeout_s: float = ANSWER_TIMEOUT_S
     faults: tuple[Fault, ...] = ()
     ends_early: bool = True
+    initial: Initial | None = None
+    """State of the cell at the start; that of the preset without."""
 
 
 def run_both(
@@ -89,6 +96,7 @@ def run_both(
 
     `ecu_factory` replaces the controller that the settings name. Raises InputError or BusError.
     """
+    require_room_for_ecu(settings.bus)
     database = load_database()
     injection = _injection(settings, database)
     with ExitStack() as stack:
@@ -112,6 +120,19 @@ def run_both(
         return _run(settings, plant, plant_bus, database, turn, injection, recorder, progress)
 
 
+def run_sil(
+    settings: Settings, recorder: Recorder | None = None, progress: Progress = lambda soc: None
+) -> RunResult:
+    """The plant with the ECU that belongs to the bus: at the other end of a line, else here.
+
+    Raises InputError, ModelMismatchError or BusError.
+    """
+    if not is_line(settings.bus):
+        return run_both(settings, recorder, progress)
+    patient = replace(settings, answer_timeout_s=LINE_ANSWER_TIMEOUT_S)
+    return run_plant(patient, recorder, progress)
+
+
 def run_on_clocks(
     settings: Settings, recorder: Recorder | None = None, progress: Progress = lambda soc: None
 ) -> RunResult:
@@ -119,6 +140,7 @@ def run_on_clocks(
 
     Raises InputError or BusError.
     """
+    require_room_for_ecu(settings.bus)
     database = load_database()
     injection = _injection(settings, database)
     plant = _plant(settings)
@@ -158,8 +180,8 @@ def run_plant(
     for fault in settings.faults:
         if fault.needs_own_ecu:
             raise InputError(
-                f"fault '{fault.kind}': happens inside the ECU, which is another process; "
-                "use 'bms sil', or restart 'bms ecu'"
+                f"fault '{fault.kind}': happens inside the ECU, which is not in this process; "
+                "use 'bms sil' on another bus, or restart the ECU itself"
             )
     database = load_database()
     period_s = settings.preset.timing.sampling_period_s
@@ -191,7 +213,8 @@ def _plant(settings: Settings) -> Plant:
     preset = settings.preset
     step_s = preset.timing.sampling_period_s / SUB_STEPS
     rng = np.random.default_rng(_seeds(settings.seed)[0])
-    return Plant(preset, disturbance_source(settings.disturbance, preset, step_s, rng))
+    disturbance = disturbance_source(settings.disturbance, preset, step_s, rng)
+    return Plant(replace(preset, initial=settings.initial or preset.initial), disturbance)
 
 
 def _factory(settings: Settings) -> EcuFactory:
@@ -217,24 +240,44 @@ def _run(
     recorder: Recorder | None,
     progress: Progress,
 ) -> RunResult:
-    preset = settings.preset
+    preset, model = settings.preset, settings.model
+    is_firmware = settings.controller is ControllerKind.KAN_RCBF
+    losses = LossWatch()
     charge = Charge(
         preset=preset,
-        node=PlantNode(bus, database, turn, recorder, injection.sent, injection.heard),
+        node=PlantNode(
+            bus,
+            database,
+            turn,
+            recorder,
+            injection.sent,
+            lambda frames: injection.heard(losses.pass_on(frames)),
+        ),
         plant=plant,
         sensors=SensorSuite(preset.sensors, np.random.default_rng(_seeds(settings.seed)[1])),
         charger=Charger(preset, settings.charger_delay_periods),
         injection=injection,
         max_time_s=settings.max_time_s,
         ends_early=settings.ends_early,
+        model_hash=model.hash if is_firmware and isinstance(model, KanModel) else None,
         progress=progress,
     )
     start_s = time.perf_counter()
     reason = charge.run()
-    return _sum_up(settings, charge, reason, time.perf_counter() - start_s)
+    wall_time_s = time.perf_counter() - start_s
+    if is_line(settings.bus):
+        losses.hear_out(bus)
+    return _sum_up(settings, charge, reason, wall_time_s, turn.watch, losses.losses)
 
 
-def _sum_up(settings: Settings, charge: Charge, reason: str, wall_time_s: float) -> RunResult:
+def _sum_up(
+    settings: Settings,
+    charge: Charge,
+    reason: str,
+    wall_time_s: float,
+    watch: PlantWatch | None,
+    losses: LineLosses,
+) -> RunResult:
     series, extremes = charge.series, charge.plant.extremes
     limits = settings.preset.limits
     estimates = settings.controller is ControllerKind.KAN_RCBF
@@ -267,5 +310,9 @@ def _sum_up(settings: Settings, charge: Charge, reason: str, wall_time_s: float)
         model_hash=charge.identity.model if charge.identity else None,
         preset_hash=settings.preset.hash,
         faults=charge.injection.injected,
+        timing=watch.timing([command is not None for command in series.command_A])
+        if watch is not None
+        else None,
+        line_losses=losses if is_line(settings.bus) else None,
     )
-    return RunResult(summary, series)
+    return RunResult(summary, series, watch)

@@ -1,8 +1,10 @@
 #!/bin/sh
-# Installs the Debian packages that the tests need: user-mode-linux for a real vcan0, can-utils to read it.
+# Installs Debian packages: compiler and emulator of the microcontroller ports with the word firmware, else all
+# that the tests need, with user-mode-linux for a real vcan0 and can-utils to read it.
 # On Debian as root it installs them; elsewhere it names the command, and the tests say what is not run.
 set -eu
-packages="user-mode-linux can-utils iproute2"
+packages="gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"
+[ "${1:-}" = firmware ] || packages="$packages user-mode-linux can-utils iproute2"
 missing=""
 for package in $packages; do
   dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q "install ok installed" || missing="$missing $package"
@@ -13,5 +15,5 @@ if [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null; then
   apt-get update -qq
   DEBIAN_FRONTEND=noninteractive $command >/dev/null
 else
-  echo "tests: for the runs on a real vcan0 run as root: $command" >&2
+  echo "not installed, run as root: $command" >&2
 fi

@@ -68,42 +68,77 @@ def charging_current_A(
 ) -> Any:
     """Current nearest to the reference that keeps every left-hand side above its margin; else 0 A.
 
-    Every side is concave in the current, an absolute value being the smaller of two quadratics, so
-    each allows an interval; the answer is the largest of their lower ends and the reference, and
-    0 A where no charging current lies in all of them.
+    The answer is the lower end of `current_interval_A`, and 0 A where that is empty.
     """
-    a, core_K = constants, state.core_temperature_K
+    lower_A, upper_A = current_interval_A(
+        cell, preset, constants, margins, state, cooling_power_W, error_bound_K
+    )
+    return np.where(lower_A <= upper_A, lower_A, 0.0)
+
+
+def current_interval_A(
+    cell: CellParameters,
+    preset: Preset,
+    constants: BarrierConstants,
+    margins: Margins,
+    state: CellState,
+    cooling_power_W: Any,
+    error_bound_K: Any = 0.0,
+) -> tuple[Any, Any]:
+    """Charging currents that keep every left-hand side above its margin, from the reference to 0 A.
+
+    Every side is concave in the current, an absolute value being the smaller of two quadratics, so
+    each allows an interval. The lower end is above the upper one where there is none.
+    """
     rest = left_hand_sides(cell, preset, constants, state, cooling_power_W, 0.0)
+    lower_A: Any = preset.limits.reference_current_A
+    upper_A: Any = 0.0
+    for low_A in (
+        -(rest.voltage_V - margins.voltage_V) / cell.ohmic_resistance_ohm,
+        -(rest.soc_per_s - margins.soc_per_s) * cell.capacity_As,
+    ):
+        lower_A = np.maximum(lower_A, low_A)
+    core_K = state.core_temperature_K
+    for side in thermal_sides(cell, preset, constants, margins, rest, core_K, error_bound_K):
+        low_A, high_A = quadratic_interval(*side)
+        lower_A = np.maximum(lower_A, low_A)
+        upper_A = np.minimum(upper_A, high_A)
+    return lower_A, upper_A
+
+
+def thermal_sides(
+    cell: CellParameters,
+    preset: Preset,
+    constants: BarrierConstants,
+    margins: Margins,
+    rest: ConstraintMargins,
+    core_K: Any,
+    error_bound_K: Any = 0.0,
+) -> list[tuple[Any, Any, Any]]:
+    """(square, slope, constant) of each constant + slope u - square u^2 >= 0 on core and surface.
+
+    One for either sign of the error of the core estimate; `rest` are the left-hand sides at 0 A.
+    """
+    a = constants
     core_error_per_s = a.a1_per_s - preset.gains.core_gain_per_s(cell)
-    intervals = [
-        (
-            -(rest.voltage_V - margins.voltage_V) / cell.ohmic_resistance_ohm,
-            np.inf,
-        ),
-        (-(rest.soc_per_s - margins.soc_per_s) * cell.capacity_As, np.inf),
-    ]
+    sides = []
     for sign in (-1.0, 1.0):
         error_K = sign * error_bound_K
-        intervals.append(
-            quadratic_interval(
+        sides.append(
+            (
                 a.a3_K_per_A2s,
                 a.a2_per_As * (core_K + error_K),
                 rest.core_K_per_s - margins.core_K_per_s + core_error_per_s * error_K,
             )
         )
-        intervals.append(
-            quadratic_interval(
+        sides.append(
+            (
                 -a.a9_K_per_A2s2,
                 a.a8_per_As2 * (core_K + error_K),
                 rest.surface_K_per_s2 - margins.surface_K_per_s2 + a.a4_per_s2 * error_K,
             )
         )
-    lower_A: Any = preset.limits.reference_current_A
-    upper_A: Any = 0.0
-    for low_A, high_A in intervals:
-        lower_A = np.maximum(lower_A, low_A)
-        upper_A = np.minimum(upper_A, high_A)
-    return np.where(lower_A <= upper_A, lower_A, 0.0)
+    return sides
 
 
 def quadratic_interval(square: Any, slope: Any, rest: Any) -> tuple[Any, Any]:

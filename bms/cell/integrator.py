@@ -45,5 +45,10 @@ def integrate_step(
     k2 = rates(cell, _advance(state, k1, 0.5 * step_s), current_A, cooling_power_W, middle)
     k3 = rates(cell, _advance(state, k2, 0.5 * step_s), current_A, cooling_power_W, middle)
     k4 = rates(cell, _advance(state, k3, step_s), current_A, cooling_power_W, after)
-    mean = CellState(*((a + 2.0 * (b + c) + d) / 6.0 for a, b, c, d in zip(k1, k2, k3, k4)))
+    mean = CellState(
+        (k1[0] + 2.0 * (k2[0] + k3[0]) + k4[0]) / 6.0,
+        (k1[1] + 2.0 * (k2[1] + k3[1]) + k4[1]) / 6.0,
+        (k1[2] + 2.0 * (k2[2] + k3[2]) + k4[2]) / 6.0,
+        (k1[3] + 2.0 * (k2[3] + k3[3]) + k4[3]) / 6.0,
+    )
     return _advance(state, mean, step_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -61,7 +62,7 @@ class CellParameters:
     entropic_coefficient_V_per_K: Finite
     ocv: OpenCircuitVoltage
 
-    @property
+    @cached_property
     def capacity_As(self) -> float:
         """Capacity in ampere seconds."""
         return self.capacity_Ah * SECONDS_PER_HOUR

@@ -22,7 +22,7 @@ HEADERS = (
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
-# What a host needs beyond the firmware: constants by address, and estimates by the thousand.
+# What a host needs beyond the firmware: constants by address, and its functions by the thousand.
 _HOST_DECLARATIONS = """
 const bms_calibration_t *host_default_calibration(void);
 const fault_policy_t *host_fault_policies(void);
@@ -30,9 +30,14 @@ void host_estimate_rows(const kan_model_t *model, const float *inputs, uint32_t 
                         float *core_temperature_K, uint8_t *in_domain);
 void host_edge_values(const kan_model_t *model, uint32_t edge, const float *arguments,
                       uint32_t count, float *values, uint8_t *in_domain);
+void host_decide_rows(const rcbf_constants_t *constants, const rcbf_input_t *inputs, uint32_t rows,
+                      float *current_A);
+uint32_t host_run_periods(bms_t *bms, const can_frame_t *received, uint32_t frames_a_period,
+                          uint32_t periods, float *command_A);
 """
 _HOST_SOURCE = """
 #include "bms.h"
+#include "image.h"
 
 static const bms_calibration_t *host_default_calibration(void)
 {
@@ -63,6 +68,32 @@ static void host_edge_values(const kan_model_t *model, uint32_t edge, const floa
         in_domain[i] = inside ? 1u : 0u;
     }
 }
+
+static void host_decide_rows(const rcbf_constants_t *constants, const rcbf_input_t *inputs,
+                             uint32_t rows, float *current_A)
+{
+    for (uint32_t i = 0u; i < rows; i++) {
+        current_A[i] = rcbf_solve(constants, &inputs[i]).current_A;
+    }
+}
+
+static uint32_t host_run_periods(bms_t *bms, const can_frame_t *received, uint32_t frames_a_period,
+                                 uint32_t periods, float *command_A)
+{
+    can_frame_t sent;
+    uint32_t frames_sent = 0u;
+    for (uint32_t period = 0u; period < periods; period++) {
+        for (uint32_t i = 0u; i < frames_a_period; i++) {
+            bms_receive(bms, received++);
+        }
+        bms_step(bms);
+        while (bms_transmit(bms, &sent)) {
+            frames_sent++;
+        }
+        command_A[period] = bms->command_A;
+    }
+    return frames_sent;
+}
 """
 
 
@@ -81,9 +112,10 @@ def make_builder(flags: tuple[str, ...] = FLAGS, tree: Path | None = None) -> FF
     builder = FFI()
     home, base = (ROOT, Path()) if tree is None else (tree.resolve(), tree.resolve())
     headers = [home / FIRMWARE / "include" / f"{name}.h" for name in HEADERS]
+    headers.append(home / FIRMWARE / "image" / "image.h")
     builder.cdef("\n".join(declarations(header) for header in headers))
     builder.cdef(_HOST_DECLARATIONS)
-    folders = [FIRMWARE / name for name in ("include", "src", "generated")]
+    folders = [FIRMWARE / name for name in ("include", "src", "generated", "image")]
     sources = [path for folder in folders for path in sorted((home / folder).glob("*.c"))]
     builder.set_source(
         MODULE,

@@ -137,13 +137,16 @@ class Firmware:
         The core temperature is the estimate; its error bound is in the constraints. Infeasible
         states and inputs that are not finite give 0 A with `feasible` false.
         """
-        problem = self._input
-        problem.soc, problem.cooling_power_W = soc, cooling_power_W
-        _set_temperature(problem.core_temperature_K, core_temperature_K)
-        _set_temperature(problem.surface_temperature_K, surface_temperature_K)
-        _set_temperature(problem.coolant_temperature_K, coolant_temperature_K)
-        problem.reference_current_A = reference_current_A
-        answer = lib.rcbf_solve(ffi.addressof(self._calibration.rcbf), problem)
+        write_decision_input(
+            self._input,
+            soc=soc,
+            core_temperature_K=core_temperature_K,
+            surface_temperature_K=surface_temperature_K,
+            coolant_temperature_K=coolant_temperature_K,
+            cooling_power_W=cooling_power_W,
+            reference_current_A=reference_current_A,
+        )
+        answer = lib.rcbf_solve(ffi.addressof(self._calibration.rcbf), self._input)
         return Decision(
             current_A=answer.current_A,
             feasible=bool(answer.feasible),
@@ -194,6 +197,24 @@ class Firmware:
                 "surface_margin_K_per_s2": margins.surface_K_per_s2,
             }
         )
+
+
+def write_decision_input(
+    target: Any,
+    *,
+    soc: float,
+    core_temperature_K: float,
+    surface_temperature_K: float,
+    coolant_temperature_K: float,
+    cooling_power_W: float,
+    reference_current_A: float,
+) -> None:
+    """Fill a rcbf_input_t."""
+    target.soc, target.cooling_power_W = soc, cooling_power_W
+    _set_temperature(target.core_temperature_K, core_temperature_K)
+    _set_temperature(target.surface_temperature_K, surface_temperature_K)
+    _set_temperature(target.coolant_temperature_K, coolant_temperature_K)
+    target.reference_current_A = reference_current_A
 
 
 def _set_temperature(target: Any, temperature_K: float) -> None:

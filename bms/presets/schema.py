@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Annotated
 
 from annotated_types import Ge, Gt, Le
@@ -178,7 +179,7 @@ class Preset:
         if self.limits.completion_soc > self.limits.max_soc:
             raise InputError("limits.completion_soc: must not exceed limits.max_soc")
 
-    @property
+    @cached_property
     def hash(self) -> str:
         """SHA-256 of the whole content, as hexadecimal text."""
         return _digest(asdict(self))

@@ -1,4 +1,4 @@
-"""`bms export`: C sources for a model and a preset."""
+"""`bms export`: C sources and calibration part for a model and a preset."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from typing import Annotated
 
 import typer
 
+from bms.image import calibration_part
 from bms.kan.model_file import load_model, load_shipped_model
 from bms.presets import DEFAULT_PRESET, load_preset
 from codegen.calibration_source import calibration_source
 from codegen.can_sources import can_sources
 from codegen.rendering import write_files
+
+CALIBRATION_FILE = "calibration.bin"
 
 
 def export(
@@ -23,14 +26,21 @@ def export(
         Path | None, typer.Option(help="Model JSON of 'bms train'. Default: the preset's own.")
     ] = None,
 ) -> None:
-    """Write the firmware's generated C sources: controller constants, KAN tables and CAN codec.
+    """Write what the firmware takes from a model: generated C sources and a calibration part.
+
+    The sources are controller constants, KAN tables and CAN codec. calibration.bin holds the same
+    constants and tables for 'bms flash --calibration'.
 
     Temperatures in K, currents in A (negative while charging), times in s.
 
-    Example: bms export --model model.json --preset paper_calibrated --out firmware_c/generated
+    Example: bms export --model model.json --preset paper_calibrated --out out/export
     """
     chosen = load_preset(preset)
     estimator = load_model(model) if model else load_shipped_model(chosen.name)
-    contents = {**can_sources(), **calibration_source(chosen, estimator)}
+    contents: dict[str, str | bytes] = {
+        **can_sources(),
+        **calibration_source(chosen, estimator),
+        CALIBRATION_FILE: calibration_part(chosen, estimator),
+    }
     for path in write_files(out, contents):
         print(path)

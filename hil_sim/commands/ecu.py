@@ -14,6 +14,7 @@ from bms.presets import DEFAULT_PRESET
 from hil_sim.bus import open_bus, require_shared
 from hil_sim.clock import WallClock
 from hil_sim.nodes.ecu import EcuNode
+from hil_sim.punctuality import Slots, Spread
 
 
 def ecu(
@@ -56,4 +57,15 @@ def ecu(
         else:
             node.run(silence_s, stop.is_set)
     print(f"ECU on {bus}: {node.frames} frames received, {node.steps} steps")
+    if node.slots is not None and node.slots.late_s:
+        print(_punctuality(node.slots))
     return 0
+
+
+def _punctuality(slots: Slots) -> str:
+    stall_ms, deadline_ms = 1000.0 * slots.longest_stall_s, 1000.0 * slots.deadline_s
+    return (
+        f"steps began late by: {Spread.of(slots.late_s)}\n"
+        f"deadlines missed: {slots.missed} (allowed: {deadline_ms:g} ms), "
+        f"steps left out: {slots.skipped}, longest stall: {stall_ms:.2f} ms"
+    )

@@ -77,7 +77,7 @@ def fault_matrix(
     Example: bms fault-matrix --rows corrupted --out out/faults
     """
     settings = MatrixSettings(*load_pair(preset, model), bus, seed)
-    chosen = _chosen(load_matrix(matrix), rows)
+    chosen = chosen_rows(load_matrix(matrix), rows)
     with OutputFolder(out) if out is not None else nullcontext() as folder:
         start_s = time.perf_counter()
         verdicts = _play(settings, chosen, jobs)
@@ -95,7 +95,7 @@ def fault_matrix(
     return EXIT_CHECK_FAILED if result.red else EXIT_DONE
 
 
-def _chosen(rows: tuple[Row, ...], patterns: list[str] | None) -> list[Row]:
+def chosen_rows(rows: tuple[Row, ...], patterns: list[str] | None) -> list[Row]:
     """Rows that any pattern names, in the order of the matrix; each pattern must name one."""
     if not patterns:
         return list(rows)

@@ -48,7 +48,7 @@ class ReplayReport:
             "equal": comparison.is_equal,
             "log_charge_Ah": recorded.charge_Ah,
             "replay_charge_Ah": replayed.charge_Ah,
-            "first_difference": None if first is None else _first_json(first, signals),
+            "first_difference": None if first is None else first_json(first, signals),
             "signals": _signals_json(comparison, signals),
         }
 
@@ -64,7 +64,7 @@ class ReplayReport:
             return
         share = f"{comparison.differing_periods} of {comparison.periods}"
         _say(console, f"the ECU says something else in {share} periods")
-        console.print(_first_table(comparison.first, self.signals))
+        console.print(first_table(comparison.first, self.signals))
         console.print(_largest_table(comparison, self.signals))
         recorded, replayed = (side.charge_Ah for side in self.outcomes)
         _say(console, f"charge commanded: {recorded:.5f} Ah in the log, {replayed:.5f} Ah now")
@@ -118,15 +118,18 @@ def _values_json(values: Values, signals: Signals) -> dict[str, float | None]:
     return {signals.key(name): value for name, value in values.items()}
 
 
-def _first_json(first: PeriodDifference, signals: Signals) -> dict[str, Any]:
+def first_json(
+    first: PeriodDifference, signals: Signals, sides: tuple[str, str] = ("log", "replay")
+) -> dict[str, Any]:
+    """The same as JSON."""
     one, other = first.sides
     return {
         "period": first.period,
         "time_s": first.time_s,
         "differing_signals": list(first.signals),
         "received": _values_json(first.received, signals),
-        "log": _values_json(one, signals),
-        "replay": _values_json(other, signals),
+        sides[0]: _values_json(one, signals),
+        sides[1]: _values_json(other, signals),
     }
 
 
@@ -159,11 +162,14 @@ def _verdict_json(verdict: LogVerdict) -> dict[str, Any]:
     }
 
 
-def _first_table(first: PeriodDifference, signals: Signals) -> Table:
+def first_table(
+    first: PeriodDifference, signals: Signals, sides: tuple[str, str] = ("log", "replay")
+) -> Table:
+    """What both sides got in the first period that differs, and what each said."""
     title = f"first difference: period {first.period}, {first.time_s:.3f} s"
     table = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0))
     table.add_column("")
-    for side in ("log", "replay"):
+    for side in sides:
         table.add_column(side, justify="right")
     table.add_column("unit")
     for name in first.received:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Annotated
 
 import typer
 
 from bms.errors import InputError
+from bms.firmware.calibration import load_pair
 from bms.presets import load_preset
+from hil_sim.bus import is_line
 from hil_sim.commands import options
 from hil_sim.commands.outcome import charge_and_report
 from hil_sim.disturbances import DisturbanceKind
 from hil_sim.faults import load_faults
-from hil_sim.session import ControllerKind, Settings, run_both
+from hil_sim.session import ControllerKind, Settings, run_sil
+from hil_sim.targets.catalog import find_board
 
 
 def sil(
@@ -27,7 +31,15 @@ def sil(
     ] = None,
     preset: options.PresetOption = options.DEFAULT_PRESET,
     model: options.ModelOption = None,
-    bus: options.BusOption = "virtual:bms",
+    bus: options.BusOption = Settings.bus,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            "--target",
+            help="Start the image of 'make firmware' on this board, and take its line as the bus: "
+            "qemu:mps2-an386 or qemu:mps2-an385.",
+        ),
+    ] = None,
     seed: options.SeedOption = 0,
     disturbance: options.DisturbanceOption = DisturbanceKind.NONE,
     faults: options.FaultsOption = None,
@@ -39,27 +51,43 @@ def sil(
 ) -> int:
     """Charge a simulated cell over a CAN bus with the ECU in the same process.
 
+    On a bus slcan:... the ECU is the one at the other end of that line, such as an image in QEMU or
+    on a board: nothing of it runs here, and it has to name the given preset and model.
     Temperatures in K, currents in A (negative while charging), times in s from the start of the
     charge. The S-CBF baselines know the true state of the cell, as their method assumes; all others
     see the bus only. Exit code 1 when the controller lets a limit be crossed or the charge fails.
 
     Example: bms sil --baseline s-cbf --disturbance bang-bang --out out/run
     """
-    if model is not None and ControllerKind.KAN_RCBF not in (controller, baseline):
-        raise InputError(
-            f"--model {model}: only {ControllerKind.KAN_RCBF.value} has an estimator; "
-            "leave it out or choose that controller"
+    with ExitStack() as stack:
+        if target is not None:
+            if bus != Settings.bus:
+                raise InputError(f"--bus {bus}: --target brings a bus of its own; give one of both")
+            bus = stack.enter_context(find_board(target).start()).bus
+        is_remote = is_line(bus)
+        if is_remote and controller is not ControllerKind.KAN_RCBF:
+            raise InputError(
+                f"--controller {controller.value}: on '{bus}' the ECU at the other end controls; "
+                "leave it out, or name it as --baseline"
+            )
+        if model is not None and ControllerKind.KAN_RCBF not in (controller, baseline):
+            raise InputError(
+                f"--model {model}: only {ControllerKind.KAN_RCBF.value} has an estimator; "
+                "leave it out or choose that controller"
+            )
+        # Of an ECU elsewhere, preset and model are not a choice but what it has to have.
+        cell, expected = load_pair(preset, model) if is_remote else (load_preset(preset), model)
+        settings = Settings(
+            preset=cell,
+            controller=controller,
+            model=expected,
+            bus=bus,
+            seed=seed,
+            disturbance=disturbance,
+            faults=() if faults is None else load_faults(faults),
+            max_time_s=max_time_s,
+            realtime=realtime,
         )
-    settings = Settings(
-        preset=load_preset(preset),
-        controller=controller,
-        model=model,
-        bus=bus,
-        seed=seed,
-        disturbance=disturbance,
-        faults=() if faults is None else load_faults(faults),
-        max_time_s=max_time_s,
-        realtime=realtime,
-    )
-    second = None if baseline is None else replace(settings, controller=baseline)
-    return charge_and_report(settings, run_both, out, json, second, log)
+        own_bus = Settings.bus if is_remote else bus
+        second = None if baseline is None else replace(settings, controller=baseline, bus=own_bus)
+        return charge_and_report(settings, run_sil, out, json, second, log)

@@ -51,7 +51,8 @@ def run_settings(settings: MatrixSettings, row: Row) -> Settings:
     )
     periods = start.onset_period + start.after_periods
     return Settings(
-        preset=replace(settings.preset, initial=initial),
+        preset=settings.preset,
+        initial=initial,
         model=settings.model,
         bus=settings.bus,
         seed=settings.seed,

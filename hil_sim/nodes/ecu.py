@@ -10,9 +10,14 @@ from typing import Protocol
 
 from hil_sim.bus import CanBus, Frame
 from hil_sim.clock import Clock
+from hil_sim.punctuality import DEADLINE_PERIODS, Slots
 
 SYNC_ID = 0x080
 """Start of a control period in lock step (CiA 301)."""
+MEASUREMENT_ID = 0x100
+"""CellElectrical, with which the plant begins a period."""
+PHASE_PERIODS = 20
+"""Measurements after which an ECU on its own clock corrects its phase."""
 
 _LONGEST_START_FRAMES = 1000
 _MOST_FRAMES_A_PERIOD = 1000
@@ -40,6 +45,8 @@ class EcuNode:
         self._ecu = ecu
         self.frames = 0
         self.steps = 0
+        self.slots: Slots | None = None
+        """How punctual the steps were; None before the first one that a clock told."""
 
     def answer(self, timeout_s: float) -> bool:
         """Take in frames until a SYNC has been answered; False when timeout_s pass without."""
@@ -67,23 +74,35 @@ class EcuNode:
     ) -> None:
         """Step once a period by the clock, without SYNC; ends as `run` does.
 
-        The first frame sets the phase: steps fall midway between the plant's measurements, so that
-        clocks that run apart do not soon leave a period without any. After a stall the missed
-        periods are not caught up.
+        The first measurement sets the phase: steps fall midway between two of them. After every
+        PHASE_PERIODS the phase follows the most punctual one, so that neither a late first one
+        nor clocks that run apart leave periods without any. After a stall the missed periods are
+        not caught up, and the phase stays.
         """
-        due_s = last_frame_s = clock.now_s()
-        while not stopped() and not (self.frames and due_s - last_frame_s >= silence_s):
-            due_s = max(due_s + period_s, clock.now_s())
+        if not self._heard_measurement(period_s, stopped):
+            return
+        half_s = DEADLINE_PERIODS * period_s
+        slots = self.slots = Slots(period_s, clock.now_s() + half_s)
+        offsets_s: list[float] = []
+        silent_s = 0.0
+        while not stopped() and silent_s < silence_s:
+            silent_s += period_s
             for _ in range(_MOST_FRAMES_A_PERIOD):
-                frame = self._bus.receive(max(0.0, due_s - clock.now_s()))
+                frame = self._bus.receive(max(0.0, slots.due_s - clock.now_s()))
                 if frame is None:
                     break
-                if not self.frames:
-                    due_s = clock.now_s() + 0.5 * period_s
+                if frame.frame_id == MEASUREMENT_ID:
+                    offsets_s.append(clock.now_s() + half_s - slots.due_s)
                 self._take(frame)
-                last_frame_s = due_s
-            if self.frames:
-                self._step()
+                silent_s = 0.0
+            clock.sleep_until_s(slots.due_s)
+            now_s = clock.now_s()
+            slots.skip_past(now_s)
+            slots.begin(now_s)
+            self._step()
+            if len(offsets_s) >= PHASE_PERIODS:
+                slots.start_s += min(offsets_s)
+                offsets_s.clear()
 
     def _take(self, frame: Frame) -> bool:
         self.frames += 1
@@ -95,6 +114,14 @@ class EcuNode:
         self.steps += 1
         for frame_id, data in self._ecu.transmit():
             self._bus.send(Frame(frame_id, data))
+
+    def _heard_measurement(self, poll_s: float, stopped: Callable[[], bool]) -> bool:
+        while not stopped():
+            if (frame := self._bus.receive(poll_s)) is not None:
+                self._take(frame)
+                if frame.frame_id == MEASUREMENT_ID:
+                    return True
+        return False
 
     def _await_gap(self, gap_s: float) -> None:
         """Let a period that began before the ECU listened pass, so that the first one is whole."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bms.errors import BusError
-from hil_sim.bus import CanBus, Frame
+from hil_sim.bus import CanBus, Frame, ecu_remedy, is_line
 from hil_sim.database import MessageCodec, Values
 from hil_sim.e2e import Receiver, Sender
 from hil_sim.nodes.turns import Turn
@@ -99,37 +99,41 @@ class PlantNode:
         self._request = Sender(database["ChargeRequest"])
         self._sync = Frame(database["SYNC"].frame_id, b"")
         self._receivers = {database[name].frame_id: Receiver(database[name]) for name in _FROM_ECU}
-        self._last_id = database["ChargeCommand"].frame_id
+        self._command = database["ChargeCommand"]
         self._states = database["ChargeCommand"].choices["CommandState"]
         self._constraints = database["Decision"].choices["ActiveConstraint"]
         self._connected = False
         self._is_answer_late = False
 
+    def wait(self) -> None:
+        """Return when the next period is due; at once in virtual time."""
+        self._turn.wait()
+
     def exchange(self, period: int, readings: Readings, request: Request) -> Answer:
         """Publish what is measured and wanted in a period, and return what the ECU answers.
 
         Until an ECU has answered for the first time, a period of a lock step is offered again
-        with the same frames, so that the ECU may start later than the plant. Raises BusError
-        when none comes.
+        with the same frames, so that the ECU may start later than the plant; not on a line, where
+        the first offer waits for it. Raises BusError when none comes.
         """
         frames = self._sent(self._frames(readings, request))
         late = self._late_frames(period) if self._is_answer_late else []
-        for _ in range(CONNECT_ATTEMPTS):
+        self._turn.begin()
+        for attempt in range(CONNECT_ATTEMPTS):
             sent_s = self._turn.time_s(period)
-            for frame in frames:
-                self._bus.send(frame)
+            if not (attempt and is_line(self._bus.name)):
+                for frame in frames:
+                    self._bus.send(frame)
             heard = [
                 (self._turn.time_s(period), frame)
-                for frame in self._turn.answers(self._bus, period, self._last_id)
+                for frame in self._turn.answers(self._bus, period, self._is_last)
             ]
-            is_answered = any(frame.frame_id == self._last_id for _, frame in heard)
+            is_answered = any(self._is_last(frame) for _, frame in heard)
             self._connected = self._connected or is_answered
             if self._connected or not self._turn.sync:
                 break
         else:
-            raise BusError(
-                f"bus '{self._bus.name}': no ECU answers; start 'bms ecu --bus {self._bus.name}'"
-            )
+            raise BusError(f"bus '{self._bus.name}': no ECU answers; {ecu_remedy(self._bus.name)}")
         self._is_answer_late = not is_answered
         if self._recorder is not None:
             for time_s, frame in late:
@@ -139,6 +143,10 @@ class PlantNode:
             for time_s, frame in heard:
                 self._recorder.record(time_s, frame, received=True)
         return self._answer(self._heard([frame for _, frame in heard]))
+
+    def _is_last(self, frame: Frame) -> bool:
+        """A damaged frame of that identifier, whoever sent it, does not end the ECU's answer."""
+        return frame.frame_id == self._command.frame_id and self._command.is_intact(frame.data)
 
     def _late_frames(self, period: int) -> list[tuple[float, Frame]]:
         """What came too late for the last period; it must not pass for an answer to this one."""

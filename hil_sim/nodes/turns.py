@@ -7,9 +7,14 @@ from typing import Protocol
 
 from hil_sim.bus import CanBus, Frame
 from hil_sim.clock import Clock
+from hil_sim.punctuality import PlantWatch
 
 MOST_FRAMES = 10_000
 """Foreign frames after which an ECU that does not answer is taken for silent."""
+WORK_PERIODS = 0.1
+"""End of a real-time period in which the plant does not listen but integrates the cell."""
+
+IsLast = Callable[[Frame], bool]
 
 
 class Turn(Protocol):
@@ -18,12 +23,25 @@ class Turn(Protocol):
     sync: bool
     """Whether the plant starts each period with a SYNC frame."""
 
+    @property
+    def watch(self) -> PlantWatch | None:
+        """How punctual the run is; None where time is virtual."""
+        ...
+
+    def wait(self) -> None:
+        """Return when the next period is due."""
+        ...
+
+    def begin(self) -> None:
+        """The measurements of the next period go out now."""
+        ...
+
     def time_s(self, period: int) -> float:
         """Time stamp of a frame that passes in a period."""
         ...
 
-    def answers(self, bus: CanBus, period: int, last_id: int) -> Iterator[Frame]:
-        """Frames of others in a period; one with last_id is the last of an ECU's step."""
+    def answers(self, bus: CanBus, period: int, is_last: IsLast) -> Iterator[Frame]:
+        """Frames of others in a period; is_last tells the last one of an ECU's step."""
         ...
 
 
@@ -43,11 +61,22 @@ class LockStep:
         self._timeout_s = timeout_s
         self._serve = serve
 
+    @property
+    def watch(self) -> PlantWatch | None:
+        """None."""
+        return None
+
+    def wait(self) -> None:
+        """A period is due when the one before is over."""
+
+    def begin(self) -> None:
+        """Virtual time is always punctual."""
+
     def time_s(self, period: int) -> float:
         """The period's virtual start."""
         return period * self._period_s
 
-    def answers(self, bus: CanBus, period: int, last_id: int) -> Iterator[Frame]:
+    def answers(self, bus: CanBus, period: int, is_last: IsLast) -> Iterator[Frame]:
         """Frames up to the ECU's last one."""
         if self._serve is not None:
             self._serve()
@@ -56,24 +85,39 @@ class LockStep:
             if frame is None:
                 return
             yield frame
-            if frame.frame_id == last_id:
+            if is_last(frame):
                 return
 
 
 class PacedLockStep(LockStep):
-    """Lock step in which a period does not end before its time on the wall clock."""
+    """Lock step in which no period begins before its time on the wall clock."""
 
     def __init__(
         self, period_s: float, timeout_s: float, serve: Callable[[], object] | None, clock: Clock
     ) -> None:
         super().__init__(period_s, timeout_s, serve)
         self._clock = clock
-        self._start_s = clock.now_s()
+        self._watch = PlantWatch(period_s)
 
-    def answers(self, bus: CanBus, period: int, last_id: int) -> Iterator[Frame]:
-        """Frames up to the ECU's last one; then the rest of the period passes."""
-        yield from super().answers(bus, period, last_id)
-        self._clock.sleep_until_s(self._start_s + self.time_s(period + 1))
+    @property
+    def watch(self) -> PlantWatch:
+        """How punctual the run is."""
+        return self._watch
+
+    def wait(self) -> None:
+        """Sleep until the next period is due."""
+        self._watch.wait(self._clock)
+
+    def begin(self) -> None:
+        """Note the time."""
+        self._watch.begin(self._clock.now_s())
+
+    def answers(self, bus: CanBus, period: int, is_last: IsLast) -> Iterator[Frame]:
+        """Frames up to the ECU's last one."""
+        for frame in super().answers(bus, period, is_last):
+            if is_last(frame):
+                self._watch.answered(self._clock.now_s())
+            yield frame
 
 
 class OnClock:
@@ -82,18 +126,33 @@ class OnClock:
     sync = False
 
     def __init__(self, period_s: float, clock: Clock) -> None:
-        self._period_s = period_s
         self._clock = clock
-        self._start_s = clock.now_s()
+        self._work_s = WORK_PERIODS * period_s
+        self._watch = PlantWatch(period_s)
+
+    @property
+    def watch(self) -> PlantWatch:
+        """How punctual the run is."""
+        return self._watch
+
+    def wait(self) -> None:
+        """Sleep until the next period is due."""
+        self._watch.wait(self._clock)
+
+    def begin(self) -> None:
+        """Note the time."""
+        self._watch.begin(self._clock.now_s())
 
     def time_s(self, period: int) -> float:
-        """Wall-clock time since the start."""
-        return self._clock.now_s() - self._start_s
+        """Wall-clock time since the first period began."""
+        return self._clock.now_s() - self._watch.slots.start_s
 
-    def answers(self, bus: CanBus, period: int, last_id: int) -> Iterator[Frame]:
-        """Every frame until the period is over."""
-        due_s = self._start_s + (period + 1) * self._period_s
-        while (left_s := due_s - self._clock.now_s()) > 0.0:
+    def answers(self, bus: CanBus, period: int, is_last: IsLast) -> Iterator[Frame]:
+        """Every frame until the plant's own work for the next period has to begin."""
+        end_s = self._watch.slots.due_s - self._work_s
+        while (left_s := end_s - self._clock.now_s()) > 0.0:
             frame = bus.receive(left_s)
             if frame is not None:
+                if is_last(frame):
+                    self._watch.answered(self._clock.now_s())
                 yield frame

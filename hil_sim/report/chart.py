@@ -58,7 +58,7 @@ def charge_chart(limits: Limits, results: Sequence[RunResult]) -> bytes:
     panels[4].set_xlabel("Time since the start of the charge (s)")
     handles, labels = panels[4].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
-    return _png(figure)
+    return png(figure)
 
 
 def estimate_chart(result: RunResult) -> bytes:
@@ -87,7 +87,7 @@ def estimate_chart(result: RunResult) -> bytes:
         _bound(errors, -bound_K, None)
     errors.set_ylabel("Estimate –\ntruth (K)")
     errors.set_xlabel("Time since the start of the charge (s)")
-    return _png(figure)
+    return png(figure)
 
 
 def _line(
@@ -122,7 +122,8 @@ def _bound(axes: Axes, value: float, label: str | None) -> None:
         )
 
 
-def _png(figure: Figure) -> bytes:
+def png(figure: Figure) -> bytes:
+    """The figure as PNG, the same bytes every time."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
     return buffer.getvalue()

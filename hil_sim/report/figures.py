@@ -53,6 +53,11 @@ def figures(limits: Limits, results: list[RunResult]) -> list[Figure]:
     for name, key, pattern in free:
         values = [_text(getattr(summary, key), pattern) for summary in summaries]
         lines.append(Figure(name, values, "", [None] * len(values)))
+    losses = [summary.line_losses for summary in summaries]
+    if any(loss is not None for loss in losses):
+        texts = [_text(None if loss is None else loss.total, "{}") for loss in losses]
+        kept = [None if loss is None else loss.total == 0 for loss in losses]
+        lines.append(Figure("Frames lost on the serial line", texts, "0", kept))
     return lines
 
 

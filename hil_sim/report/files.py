@@ -9,6 +9,7 @@ from hil_sim.report.chart import charge_chart, estimate_chart
 from hil_sim.report.figures import figures, seconds_by_constraint
 from hil_sim.report.folder import OutputFolder
 from hil_sim.report.page import data_url, render_page
+from hil_sim.report.timing import timing_chart, timing_figures
 from hil_sim.result import RunResult
 from hil_sim.session import Settings
 
@@ -50,5 +51,7 @@ def report_page(settings: Settings, results: list[RunResult], chart: bytes) -> s
             ).items()
         ],
         chart=data_url(chart),
+        punctuality=timing_figures(results),
+        timing_chart=None if results[0].watch is None else data_url(timing_chart(results[0].watch)),
         estimate_chart=data_url(estimate_chart(results[0])) if has_estimate else None,
     )

@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from hil_sim.report.figures import figures
+from hil_sim.report.timing import timing_figures
 from hil_sim.result import RunResult
 from hil_sim.session import Settings
 
@@ -24,7 +25,10 @@ def print_table(
     for result in results:
         table.add_column(result.summary.controller, justify="right")
     table.add_column("limit", justify="right")
-    for line in figures(preset.limits, results):
+    punctuality = timing_figures(results)
+    for line in [*figures(preset.limits, results), *punctuality]:
+        if punctuality and line is punctuality[0]:
+            table.add_section()
         cells = [
             f"[red]{text}[/red]" if kept is False else text
             for text, kept in zip(line.values, line.kept)

@@ -11,7 +11,11 @@ import pytest
 
 FIRMWARE = Path(__file__).parents[2] / "firmware_c"
 SOURCES = sorted([*FIRMWARE.glob("src/*.c"), *FIRMWARE.glob("generated/*.c")])
-INCLUDES = [f"-I{FIRMWARE / folder}" for folder in ("include", "src", "generated")]
+AROUND = sorted(
+    path for folder in ("image", "boot", "port") for path in FIRMWARE.glob(f"{folder}/*.c")
+)
+FOLDERS = ("include", "src", "generated", "image", "boot", "port")
+INCLUDES = [f"-I{FIRMWARE / folder}" for folder in FOLDERS]
 WARNINGS = (
     "-std=c99 -pedantic -Wall -Wextra -Werror -Wconversion -Wdouble-promotion -Wmissing-prototypes"
 ).split()
@@ -19,7 +23,7 @@ COMPILERS = [c for c in ("gcc", "clang", "clang-14") if shutil.which(c)]
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.name)
+@pytest.mark.parametrize("source", [*SOURCES, *AROUND], ids=lambda path: path.name)
 def test_no_warning(compiler: str, source: Path) -> None:
     subprocess.run([compiler, *WARNINGS, *INCLUDES, "-fsyntax-only", source], check=True)
 
@@ -67,7 +71,14 @@ def test_core_includes_no_port_and_no_system_header() -> None:
 
 
 @pytest.mark.parametrize(
-    "path", [*FIRMWARE.glob("src/*"), *FIRMWARE.glob("include/*")], ids=lambda p: p.name
+    "path",
+    [
+        path
+        for pattern in ("src/*", "include/*", "image/*", "boot/*")
+        for path in FIRMWARE.glob(pattern)
+    ]
+    + [path for path in FIRMWARE.glob("port/**/*") if path.is_file()],
+    ids=lambda p: p.name,
 )
 def test_files_stay_small(path: Path) -> None:
     assert len(path.read_text().splitlines()) <= 400

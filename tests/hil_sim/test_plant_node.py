@@ -4,7 +4,7 @@ import can
 import pytest
 
 from bms.errors import BusError
-from hil_sim.bus import open_bus
+from hil_sim.bus import Frame, open_bus
 from hil_sim.e2e import Sender
 from hil_sim.nodes.plant import CONNECT_ATTEMPTS, PlantNode, Request
 from hil_sim.nodes.turns import LockStep
@@ -79,6 +79,19 @@ def test_a_repeated_or_corrupt_command_is_none(database):
         assert wire.node.exchange(1, READINGS, REQUEST).command_A is None
         wire._serve = corrupt
         assert wire.node.exchange(2, READINGS, REQUEST).command_A is None
+
+
+def test_a_damaged_command_from_elsewhere_does_not_end_the_answer(database):
+    """Otherwise each such frame would leave the plant one more period ahead of the ECU."""
+
+    def serve(wire):
+        wire.far.send(Frame(database["ChargeCommand"].frame_id, bytes(4)))
+        wire.command(-1.0 - len(wire.heard))
+
+    with Wire("virtual:damaged", database, serve) as wire:
+        for period in range(3):
+            answer = wire.node.exchange(period, READINGS, REQUEST)
+            assert answer.command_A == pytest.approx(-2.0 - period)
 
 
 def test_an_ecu_that_starts_later_hears_the_first_period_as_if_it_were_sent_once(

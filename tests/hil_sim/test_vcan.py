@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -21,7 +22,8 @@ pytestmark = pytest.mark.skipif(not (HAS_VCAN or HAS_GUEST or "CI" in os.environ
 
 SEED = 5
 SCRIPT = """
-bms=("$PYTHON" -c 'from bms.cli import main; main()')
+# python-can imports asammdf where it is, which takes seconds here and is not needed.
+bms=("$PYTHON" -c 'import sys; sys.modules["asammdf"] = None; from bms.cli import main; main()')
 bus=(--bus socketcan:vcan0)
 
 "${bms[@]}" plant "${bus[@]}" --answer-timeout-s 0.1 2> alone.err; echo $? > alone.status
@@ -94,6 +96,34 @@ def test_in_real_time_both_run_on_clocks_of_their_own_and_the_ecu_obeys_sigterm(
     assert summary["limits_kept"] is True
     assert status(guest / "realtime.status") == 0
     assert "steps" in (guest / "realtime.out").read_text()
+
+
+def test_in_real_time_both_sides_tell_how_punctual_they_were(guest):
+    summary = json.loads((guest / "realtime.json").read_text())
+    timing = summary["timing"]
+    assert timing["periods"] == summary["steps"] > 30
+    assert 0 <= timing["missed_deadlines"] < timing["periods"]
+    assert timing["lateness"]["max_ms"] >= timing["lateness"]["median_ms"] > 0.0
+    assert 0.0 < timing["answer_latency"]["median_ms"] < timing["period_ms"]
+    assert timing["longest_without_command_periods"] <= timing["periods_without_command"]
+    late, missed = (guest / "realtime.out").read_text().splitlines()[1:]
+    assert re.fullmatch(r"steps began late by: (\w+ [\d.]+ ms(, )?){4}", late)
+    assert re.fullmatch(
+        r"deadlines missed: \d+ \(allowed: 50 ms\), steps left out: \d+, "
+        r"longest stall: [\d.]+ ms",
+        missed,
+    )
+
+
+def test_the_benchmark_finds_the_bus_in_the_guest(bms):
+    code, out, _ = bms(
+        "bench", "--quick", "--json", "--section", "simulation", "--bus", "socketcan:vcan0"
+    )
+    assert code == 0
+    (speed,) = json.loads(out)["simulation"]
+    assert speed["parties"].startswith("two processes")
+    assert speed["periods"] == 204
+    assert speed["median_speed_times_real_time"] > 1.0
 
 
 @pytest.mark.parametrize("code", [0, 7])

@@ -1,0 +1,42 @@
+"""Fills in what a linker cannot know: checksums and hashes."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import replace
+
+from bms.firmware._firmware import ffi
+from bms.image.header import CRC_COVERS_FROM, HEADER_LENGTH, Header
+from bms.image.memory_map import MEMORY_MAP
+
+_CRC_LENGTH = 4
+
+
+def sealed_part(part: bytes, model_hash: int, preset_hash: int) -> bytes:
+    """A part of which all but CRC and hashes is right, with these filled in."""
+    header = replace(Header.parse(part), model_hash=model_hash, preset_hash=preset_hash)
+    content = header.pack()[CRC_COVERS_FROM:] + part[HEADER_LENGTH:]
+    return replace(header, crc32=zlib.crc32(content)).pack() + part[HEADER_LENGTH:]
+
+
+def sealed_boot(boot: bytes) -> bytes:
+    """The boot stage with the CRC-32 of all other bytes as its last word."""
+    content = boot[:-_CRC_LENGTH]
+    return content + zlib.crc32(content).to_bytes(_CRC_LENGTH, "little")
+
+
+def sealed_headers(image: bytes) -> dict[str, bytes]:
+    """Section name -> header of both parts of a linked image."""
+    places = {
+        "application_header": MEMORY_MAP.application.address,
+        "calibration_header": MEMORY_MAP.calibration.address,
+    }
+    block = ffi.from_buffer(
+        "bms_calibration_t *", image[places["calibration_header"] + HEADER_LENGTH :]
+    )
+    headers = {}
+    for name, start in places.items():
+        length = Header.parse(image[start:]).length
+        part = sealed_part(image[start : start + length], block.model_hash, block.preset_hash)
+        headers[name] = part[:HEADER_LENGTH]
+    return headers

@@ -1,0 +1,164 @@
+/* Counts instructions on an emulated target: reads records from a file of the host, runs what each
+ * asks for, and writes the timer ticks that it took. hil_sim/cost makes the records.
+ *
+ * Command line: any name, the file of records, the file for the ticks. The emulator lets its time
+ * advance by the same step with every instruction, so that ticks are instructions.
+ */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "bms.h"
+#include "can_catalog.h"
+#include "registers.h"
+#include "semihosting.h"
+
+#define TIMER_MASK 0xFFFFFFu
+#define LONGEST_LINE 1024u
+
+typedef enum { RESTART = 0, PERIOD = 1, STATE = 2 } record_kind_t;
+
+typedef struct {
+    float estimator_inputs[KAN_MAX_WIDTH];
+    rcbf_input_t decision_input;
+} state_t;
+
+typedef struct {
+    uint32_t kind; /* record_kind_t */
+    union {
+        can_frame_t frames[CAN_RECEIVED_COUNT]; /* what the ECU receives in a period */
+        state_t state;
+    } content;
+} record_t;
+
+/* Ticks of nothing at all, too, which every other count contains. */
+typedef struct {
+    uint32_t nothing;
+    uint32_t estimate;
+    uint32_t decision;
+    uint32_t period;
+} ticks_t;
+
+typedef struct {
+    record_t record;
+    bms_t bms;
+    can_frame_t sent;
+    state_t state;
+    float result;
+} cost_t;
+
+static void do_nothing(cost_t *cost)
+{
+    cost->result = 0.0f;
+}
+
+static void estimate(cost_t *cost)
+{
+    cost->result = kan_evaluate(&BMS_DEFAULT_CALIBRATION.kan, cost->state.estimator_inputs)
+                       .core_temperature_K;
+}
+
+static void decide(cost_t *cost)
+{
+    cost->result =
+        rcbf_solve(&BMS_DEFAULT_CALIBRATION.rcbf, &cost->state.decision_input).current_A;
+}
+
+static void run_period(cost_t *cost)
+{
+    for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
+        bms_receive(&cost->bms, &cost->record.content.frames[i]);
+    }
+    bms_step(&cost->bms);
+    while (bms_transmit(&cost->bms, &cost->sent)) {
+    }
+}
+
+/* What the last period has estimated and decided on. */
+static void take_state(cost_t *cost)
+{
+    const bms_t *bms = &cost->bms;
+    const codec_measurement_t *m = &bms->measurement;
+    cost->state = (state_t){
+        .estimator_inputs = { m->current_A, m->cooling_power_W, bms->surface_temperature_K,
+                              m->coolant_temperature_K },
+        .decision_input = {
+            .core_temperature_K = { .high_K = bms->estimate.core_temperature_K },
+            .surface_temperature_K = { .high_K = bms->surface_temperature_K },
+            .coolant_temperature_K = { .high_K = m->coolant_temperature_K },
+            .cooling_power_W = m->cooling_power_W,
+            .soc = bms->soc.soc,
+            .reference_current_A = m->reference_current_A,
+        },
+    };
+    for (uint32_t i = 0u; i < BMS_DEFAULT_CALIBRATION.kan.lags; i++) {
+        cost->state.estimator_inputs[KAN_MEASURED_INPUTS + i] = bms->history.filtered[i];
+    }
+}
+
+static uint32_t ticks_of(cost_t *cost, void (*work)(cost_t *))
+{
+    SYSTICK->VAL = 0u;
+    const uint32_t before = SYSTICK->VAL;
+    work(cost);
+    return (before - SYSTICK->VAL) & TIMER_MASK;
+}
+
+static ticks_t play(cost_t *cost)
+{
+    ticks_t ticks = { .nothing = ticks_of(cost, do_nothing) };
+    if (cost->record.kind == PERIOD) {
+        ticks.period = ticks_of(cost, run_period);
+        take_state(cost);
+    } else {
+        cost->state = cost->record.content.state;
+    }
+    ticks.estimate = ticks_of(cost, estimate);
+    ticks.decision = ticks_of(cost, decide);
+    return ticks;
+}
+
+static bool play_file(cost_t *cost, int32_t records, int32_t results)
+{
+    const bms_config_t config = { &BMS_DEFAULT_CALIBRATION };
+    while (semihosting_read(records, &cost->record, sizeof cost->record) == sizeof cost->record) {
+        if (cost->record.kind == RESTART) {
+            bms_init(&cost->bms, &config);
+            continue;
+        }
+        const ticks_t ticks = play(cost);
+        if (semihosting_write(results, &ticks, sizeof ticks) != 0u) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Ends the word where a blank stands, and gives what comes after it. */
+static char *next_word(char *text)
+{
+    while ((*text != '\0') && (*text != ' ')) {
+        text++;
+    }
+    if (*text == ' ') {
+        *text = '\0';
+        text++;
+    }
+    return text;
+}
+
+int main(void)
+{
+    static cost_t cost;
+    static char line[LONGEST_LINE];
+    semihosting_command_line(line, sizeof line);
+    char *const records_path = next_word(line);
+    char *const results_path = next_word(records_path);
+    (void)next_word(results_path);
+    const int32_t records = semihosting_open(records_path, SEMIHOSTING_READ);
+    const int32_t results = semihosting_open(results_path, SEMIHOSTING_WRITE);
+    SYSTICK->LOAD = TIMER_MASK;
+    SYSTICK->CTRL = SYSTICK_ENABLE | SYSTICK_CORE_CLOCK;
+    const bool is_done = (records >= 0) && (results >= 0) && play_file(&cost, records, results);
+    semihosting_exit(is_done ? 0u : 1u);
+    return 0;
+}

@@ -1,0 +1,15 @@
+/* Header of the calibration that is built in. CRC and hashes are filled in after linking. */
+#include "bms.h"
+#include "image.h"
+
+extern const image_header_t CALIBRATION_HEADER;
+
+__attribute__((section(".calibration_header"), used)) const image_header_t CALIBRATION_HEADER = {
+    .magic = IMAGE_MAGIC_CALIBRATION,
+    .length = sizeof(image_header_t) + sizeof(bms_calibration_t),
+    .header_layout = IMAGE_HEADER_LAYOUT,
+    .target = IMAGE_ANY_TARGET,
+    .firmware_version = BMS_FIRMWARE_VERSION,
+    .calibration_layout = BMS_CALIBRATION_LAYOUT,
+    .calibration_length = sizeof(image_header_t) + sizeof(bms_calibration_t),
+};

@@ -1,0 +1,95 @@
+# Rules of every microcontroller port: boot stage, application and calibration as one image.
+# A port sets TARGET, TARGET_ID and CPU. Run from the repository's root.
+BUILD ?= build/firmware/$(TARGET)
+PYTHON ?= .venv/bin/python
+CROSS ?= arm-none-eabi-
+F := firmware_c
+RULES := $(MAKEFILE_LIST)
+
+WARNINGS := -pedantic -Wall -Wextra -Werror -Wconversion -Wdouble-promotion -Wmissing-prototypes
+# Without fused multiply-add and errno the same operations give the same bits as on the host.
+NUMERICS := -ffp-contract=off -fno-math-errno
+# Whoever builds anywhere gets the same bytes.
+REPRODUCIBLE := -ffile-prefix-map=$(CURDIR)=. -g0
+CFLAGS := -std=c99 -Os -mthumb $(CPU) $(WARNINGS) $(NUMERICS) $(REPRODUCIBLE) \
+  -ffunction-sections -fdata-sections -fcallgraph-info=su -MMD \
+  -DPORT_TARGET=$(TARGET_ID)u \
+  -I$F/include -I$F/src -I$F/generated -I$F/image -I$F/boot -I$F/port -I$F/port/cortex_m
+# Where the processor has no square root: the C library's own, without the wrapper that sets errno.
+LDFLAGS := $(CPU) -mthumb -nostartfiles --specs=nano.specs -L$F/linker \
+  -Wl,--gc-sections -Wl,--fatal-warnings -Wl,--build-id=none \
+  -Wl,--defsym=sqrtf=__ieee754_sqrtf
+
+APPLICATION_SOURCES := $(wildcard $F/src/*.c $F/generated/*.c $F/port/*.c) \
+  $(addprefix $F/port/cortex_m/, startup.c port.c main.c application_header.c calibration_header.c)
+BOOT_SOURCES := $F/src/codec.c $F/src/e2e.c $F/generated/can_catalog.c $F/generated/can_db.c \
+  $(wildcard $F/image/*.c $F/boot/*.c) $F/port/slcan.c \
+  $(addprefix $F/port/cortex_m/, startup.c boot.c)
+APPLICATION_OBJECTS := $(APPLICATION_SOURCES:%.c=$(BUILD)/application/%.o)
+BOOT_OBJECTS := $(BOOT_SOURCES:%.c=$(BUILD)/boot/%.o)
+PARTS := application_header calibration_header
+
+.PHONY: image budgets
+.DELETE_ON_ERROR:
+
+# The build fails when the image needs more than firmware_c/budgets.toml allows.
+image: $(BUILD)/firmware.elf $(BUILD)/firmware.hex $(BUILD)/firmware.bin budgets
+
+budgets: $(BUILD)/firmware.elf $(BUILD)/sizes.o
+	@$(PYTHON) -m codegen.budgets $(BUILD) --target $(TARGET) --cross $(CROSS) $(if $(ACCEPT),--accept)
+
+$(BUILD)/sizes.o: $(wildcard $F/include/*.h)
+	@printf '#include "bms.h"\nextern char state[]; char state[sizeof(bms_t)];\n' | \
+	  $(CROSS)gcc $(CFLAGS) -x c -c - -o $@
+
+$(BUILD)/application/%.o: %.c $(RULES)
+	@mkdir -p $(@D)
+	@$(CROSS)gcc $(CFLAGS) -c $< -o $@
+
+$(BUILD)/boot/%.o: %.c $(RULES)
+	@mkdir -p $(@D)
+	@$(CROSS)gcc $(CFLAGS) -c $< -o $@
+
+$(BUILD)/boot.elf: $(BOOT_OBJECTS) $F/linker/boot.ld $F/linker/memory.ld $F/linker/ram.ld
+	@$(CROSS)gcc $(LDFLAGS) -T boot.ld -Wl,-Map=$(BUILD)/boot.map $(BOOT_OBJECTS) -lm -o $@
+
+$(BUILD)/boot_unsealed.bin: $(BUILD)/boot.elf
+	@$(CROSS)objcopy -O binary $< $@
+
+$(BUILD)/boot.bin: $(BUILD)/boot_unsealed.bin
+	@$(PYTHON) -m bms.image boot $< --out $(BUILD)
+
+$(BUILD)/boot_image.o: $F/port/cortex_m/boot_image.S $(BUILD)/boot.bin
+	@$(CROSS)gcc $(CPU) -mthumb -Wa,-I$(BUILD) -c $< -o $@
+
+$(BUILD)/unsealed.elf: $(APPLICATION_OBJECTS) $(BUILD)/boot_image.o $F/linker/application.ld \
+  $F/linker/memory.ld $F/linker/ram.ld
+	@$(CROSS)gcc $(LDFLAGS) -T application.ld -Wl,-Map=$(BUILD)/firmware.map \
+	  $(APPLICATION_OBJECTS) $(BUILD)/boot_image.o -lm -o $@
+
+# Erased flash reads as ones.
+$(BUILD)/unsealed.bin: $(BUILD)/unsealed.elf
+	@$(CROSS)objcopy -O binary --gap-fill=0xFF $< $@
+
+$(BUILD)/application_header.bin: $(BUILD)/unsealed.bin
+	@$(PYTHON) -m bms.image parts $< --out $(BUILD)
+
+$(BUILD)/calibration_header.bin: $(BUILD)/application_header.bin ;
+
+$(BUILD)/firmware.elf: $(BUILD)/unsealed.elf $(PARTS:%=$(BUILD)/%.bin)
+	@$(CROSS)objcopy $(foreach part,$(PARTS),--update-section .$(part)=$(BUILD)/$(part).bin) $< $@
+
+$(BUILD)/firmware.bin: $(BUILD)/firmware.elf
+	@$(CROSS)objcopy -O binary --gap-fill=0xFF $< $@
+
+$(BUILD)/firmware.hex: $(BUILD)/firmware.elf
+	@$(CROSS)objcopy -O ihex $< $@
+
+# Counts instructions; not part of the image.
+COST_OBJECTS := $(patsubst %.c,$(BUILD)/application/%.o, \
+  $(wildcard $F/src/*.c $F/generated/*.c $F/cost/*.c) $F/port/cortex_m/startup.c)
+
+$(BUILD)/cost.elf: $(COST_OBJECTS) $F/linker/cost.ld $F/linker/ram.ld
+	@$(CROSS)gcc $(LDFLAGS) -T cost.ld $(COST_OBJECTS) -lm -o $@
+
+-include $(sort $(APPLICATION_OBJECTS:.o=.d) $(BOOT_OBJECTS:.o=.d) $(COST_OBJECTS:.o=.d))

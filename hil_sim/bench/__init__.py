@@ -1,0 +1,1 @@
+"""Measures what this project costs and how fast it runs, beside other ways to the same answers."""

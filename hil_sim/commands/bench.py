@@ -1,0 +1,89 @@
+"""`bms bench`: what the firmware and the simulation cost, beside other ways to the same answers."""
+
+from __future__ import annotations
+
+import json as json_format
+import os
+import sys
+import time
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from hil_sim.bench.outcome import outcome_json
+from hil_sim.bench.race import Clocks, WrongAnswerError
+from hil_sim.bench.run import FULL, QUICK, Section, run_benchmark
+from hil_sim.bench.simulation import BUSES
+from hil_sim.bench.tables import print_tables
+from hil_sim.commands import options
+
+CAMPAIGN_RUNS = (100, 1000, 10_000)
+QUICK_CAMPAIGN_RUNS = (20,)
+QUICK_BUSES = BUSES[:1]
+
+
+def bench(
+    section: Annotated[
+        list[Section] | None,
+        typer.Option("--section", help="Only this one. May be repeated. Default: all."),
+    ] = None,
+    preset: options.PresetOption = options.DEFAULT_PRESET,
+    quick: Annotated[
+        bool,
+        typer.Option("--quick", help="A first look in seconds; --bus virtual only by default."),
+    ] = False,
+    bus: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--bus",
+            help="Bus to simulate on. May be repeated. Default: virtual, udp_multicast and "
+            "socketcan:vcan0, in the guest where the machine has none.",
+        ),
+    ] = None,
+    campaign_runs: Annotated[
+        list[int] | None,
+        typer.Option(
+            "--campaign-runs",
+            min=1,
+            help="Size of a campaign. May be repeated. Default: 100, 1000 and 10000 (minutes).",
+        ),
+    ] = None,
+    jobs: Annotated[
+        int,
+        typer.Option("--jobs", min=1, help="Processes of a campaign. Default: one a core."),
+    ] = os.cpu_count() or 1,
+    json: options.JsonOption = False,
+) -> int:
+    """Time estimate, decision, control period, simulation and campaign in one run.
+
+    All ways to an answer are given the states of the same simulated charge, and their answers are
+    compared before they are timed; exit code 1 when they differ. Medians of repetitions with
+    quartiles. What is not installed is named as not run.
+
+    Example: bms bench --section estimate --section decision --json
+    """
+    shown = Console(stderr=True, quiet=json or not sys.stderr.isatty())
+    try:
+        # A slow spinner, because it shares the processor with what is timed.
+        with shown.status("", refresh_per_second=1) as status:
+            result = run_benchmark(
+                set(section or Section),
+                preset,
+                QUICK if quick else FULL,
+                bus or list(QUICK_BUSES if quick else BUSES),
+                campaign_runs or list(QUICK_CAMPAIGN_RUNS if quick else CAMPAIGN_RUNS),
+                jobs,
+                Clocks(time.perf_counter_ns, time.process_time_ns),
+                status.update,
+            )
+    except WrongAnswerError as error:
+        print(f"bms: {error}", file=sys.stderr)
+        return EXIT_CHECK_FAILED
+    if json:
+        chosen = {"preset": preset, "quick": quick}
+        print(json_format.dumps(chosen | outcome_json(result), indent=2))
+    else:
+        print_tables(Console(), result)
+    return EXIT_DONE

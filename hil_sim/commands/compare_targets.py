@@ -1,0 +1,215 @@
+"""`bms compare-targets`: one firmware on the host, as a native process and on microcontrollers."""
+
+from __future__ import annotations
+
+import json as json_format
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.errors import InputError
+from bms.firmware.calibration import load_pair
+from bms.presets import DEFAULT_PRESET
+from hil_sim.commands import options
+from hil_sim.commands.fault_matrix import chosen_rows
+from hil_sim.commands.replay_output import first_json, first_table
+from hil_sim.faults.matrix import Row, load_matrix
+from hil_sim.faults.runner import MatrixSettings
+from hil_sim.replay.signals import Signals
+from hil_sim.targets.agreement import Agreement, FrameDifference, compare_targets
+from hil_sim.targets.catalog import BUILD, NAMES, find_target
+from hil_sim.targets.scenarios import (
+    Scenario,
+    load_scenarios,
+    record_scenarios,
+    why_not_played,
+)
+
+HOST = "host"
+
+
+def compare(
+    logs: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="Logs of runs in lock step to compare on. Default: a full charge and the fault "
+            "matrix, recorded anew."
+        ),
+    ] = None,
+    target: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--target", help=f"One of {', '.join(NAMES)}. May be repeated. Default: all of them."
+        ),
+    ] = None,
+    rows: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--rows",
+            help="Rows of the fault matrix whose name contains this; * and ? stand for others. "
+            "May be repeated. Default: all that can be played.",
+        ),
+    ] = None,
+    seed: options.SeedOption = 0,
+    build: Annotated[
+        Path, typer.Option("--build", help="Folder that 'make firmware' writes to.")
+    ] = BUILD,
+    json: options.JsonOption = False,
+) -> int:
+    """Compare the firmware on other targets with that in this process, frame by frame.
+
+    Full charge and faults are played in closed loop on the host (cffi, virtual bus). Then each
+    target gets the same frames in lock step, and everything that it says has to be the same, byte
+    for byte. Shows the first difference with period, frames and both sides' signals. Exit code 1
+    when anything differs.
+
+    Example: bms compare-targets --target qemu:mps2-an386 --rows corrupted
+    """
+    targets = [find_target(name, build) for name in dict.fromkeys(target or NAMES)]
+    if logs and rows:
+        raise InputError("--rows: the logs are what is compared; leave one of them out")
+    matrix = [] if logs else chosen_rows(load_matrix(), rows)
+    left_out = {row.name: reason for row in matrix if (reason := why_not_played(row)) is not None}
+    playable = [row for row in matrix if row.name not in left_out]
+    columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(
+        *columns,
+        console=Console(stderr=True),
+        transient=True,
+        disable=json or not sys.stderr.isatty(),
+    ) as bar:
+        count = len(logs) if logs else 1 + len(playable)
+        task = bar.add_task("runs", total=count * (len(targets) + (not logs)))
+        scenarios = load_scenarios(logs) if logs else _recorded(seed, playable, bar, task)
+        agreements = compare_targets(targets, scenarios, lambda: bar.advance(task))
+    if json:
+        print(json_format.dumps(_json(scenarios, agreements, left_out), indent=2))
+    else:
+        _print(Console(), scenarios, agreements, left_out)
+    return EXIT_DONE if _is_equal(agreements) else EXIT_CHECK_FAILED
+
+
+def _recorded(seed: int, rows: list[Row], bar: Progress, task: Any) -> list[Scenario]:
+    settings = MatrixSettings(*load_pair(DEFAULT_PRESET, None), seed=seed)
+    return record_scenarios(settings, rows, lambda: bar.advance(task))
+
+
+def _is_equal(agreements: Sequence[Sequence[Agreement]]) -> bool:
+    return all(one.comparison.is_equal for by_target in agreements for one in by_target)
+
+
+def _json(
+    scenarios: Sequence[Scenario],
+    agreements: Sequence[Sequence[Agreement]],
+    left_out: dict[str, str],
+) -> dict[str, Any]:
+    return {
+        "equal": _is_equal(agreements),
+        "scenarios": [
+            {
+                "name": scenario.name,
+                "periods": len(scenario.recording.periods),
+                "frames": _frame_count(scenario),
+                "targets": {one.target: _agreement_json(one) for one in by_scenario},
+            }
+            for scenario, *by_scenario in zip(scenarios, *agreements)
+        ],
+        "not_played": left_out,
+    }
+
+
+def _frame_count(scenario: Scenario) -> int:
+    return sum(len(p.received) + len(p.answer) for p in scenario.recording.periods)
+
+
+def _agreement_json(agreement: Agreement) -> dict[str, Any]:
+    comparison = agreement.comparison
+    signals = Signals(agreement.scenario.recording.database)
+    first = comparison.first
+    return {
+        "equal": comparison.is_equal,
+        "differing_periods": comparison.differing_periods,
+        "first_difference": None
+        if first is None
+        else {
+            **first_json(first, signals, (HOST, "target")),
+            "frames": [
+                {
+                    "id": f"{frame.frame_id:03X}",
+                    "message": frame.message,
+                    HOST: _hex(frame.host),
+                    "target": _hex(frame.target),
+                }
+                for frame in agreement.frames
+            ],
+        },
+    }
+
+
+def _print(
+    console: Console,
+    scenarios: Sequence[Scenario],
+    agreements: Sequence[Sequence[Agreement]],
+    left_out: dict[str, str],
+) -> None:
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1))
+    table.add_column("run on the host")
+    table.add_column("periods", justify="right")
+    table.add_column("frames", justify="right")
+    for by_target in agreements:
+        table.add_column(by_target[0].target)
+    for scenario, *by_scenario in zip(scenarios, *agreements):
+        counts = (len(scenario.recording.periods), _frame_count(scenario))
+        cells = [_verdict(agreement) for agreement in by_scenario]
+        table.add_row(escape(scenario.name), *map(str, counts), *cells)
+    console.print(table)
+    for by_target in agreements:
+        differing = [one for one in by_target if not one.comparison.is_equal]
+        if differing:
+            _print_first(console, differing[0])
+    for name, reason in left_out.items():
+        _say(console, f"not played: {name}: {reason}")
+    frames = sum(map(_frame_count, scenarios))
+    for by_target in agreements:
+        same = sum(one.comparison.is_equal for one in by_target)
+        text = f"{by_target[0].target}: {same} of {len(scenarios)} runs the same byte for byte"
+        style = "green" if same == len(scenarios) else "red"
+        console.print(f"[{style}]{escape(text)}[/{style}] ({frames} frames)", highlight=False)
+
+
+def _verdict(agreement: Agreement) -> str:
+    first = agreement.comparison.first
+    return "same" if first is None else f"[red]differs from period {first.period}[/red]"
+
+
+def _print_first(console: Console, agreement: Agreement) -> None:
+    first = agreement.comparison.first
+    assert first is not None
+    name = f"{agreement.scenario.name} on {agreement.target}"
+    _say(console, f"{name}: first difference in period {first.period}, {first.time_s:.3f} s")
+    for frame in agreement.frames:
+        _say(console, f"  {_difference(frame, agreement.target)}")
+    signals = Signals(agreement.scenario.recording.database)
+    console.print(first_table(first, signals, (HOST, agreement.target)))
+
+
+def _difference(frame: FrameDifference, target: str) -> str:
+    sides = (f"{HOST} {_hex(frame.host) or 'none'}", f"{target} {_hex(frame.target) or 'none'}")
+    return f"frame {frame.frame_id:03X} {frame.message}: {', '.join(sides)}"
+
+
+def _hex(data: bytes | None) -> str | None:
+    return None if data is None else data.hex().upper()
+
+
+def _say(console: Console, text: str) -> None:
+    console.print(text, markup=False, highlight=False, soft_wrap=True)

@@ -1,0 +1,102 @@
+"""`bms flash`: puts an image or a calibration into the flash of a board and starts the board."""
+
+from __future__ import annotations
+
+import json as json_module
+import signal
+from pathlib import Path
+from threading import Event
+from typing import Annotated
+
+import typer
+
+from bms.errors import InputError
+from bms.image import TARGETS
+from hil_sim.targets import Emulation, Flash
+
+_EMULATOR = "qemu:"
+_POLL_S = 0.1
+
+
+def flash(
+    target: Annotated[
+        str, typer.Option("--target", help="Board: qemu:mps2-an386 or qemu:mps2-an385.")
+    ] = "qemu:mps2-an386",
+    image: Annotated[
+        Path | None,
+        typer.Option("--image", help="Binary image of 'make firmware'. Default: what is in flash."),
+    ] = None,
+    calibration: Annotated[
+        Path | None,
+        typer.Option(
+            "--calibration", help="Calibration part of 'bms export', in place of the present one."
+        ),
+    ] = None,
+    flash_file: Annotated[
+        Path | None,
+        typer.Option("--flash", help="File of the flash. Default: build/flash/BOARD.bin."),
+    ] = None,
+    port: Annotated[
+        int,
+        typer.Option(
+            "--port", min=0, max=65535, help="TCP port of the serial line. Default: a free one."
+        ),
+    ] = 0,
+    log: Annotated[
+        Path | None, typer.Option("--log", help="File for what the emulator says. Default: none.")
+    ] = None,
+    start: Annotated[
+        bool, typer.Option("--start/--no-start", help="Start the board until Ctrl-C or SIGTERM.")
+    ] = True,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object only.")] = False,
+) -> int:
+    """Program the emulated flash of a board, then run the board until Ctrl-C or SIGTERM.
+
+    The board speaks slcan on its serial line, which one party can use at a time. What is damaged,
+    truncated or made for something else is refused, and the flash stays as it is.
+
+    Example: bms flash --image build/firmware/mps2_an386/firmware.bin --port 5000
+    """
+    board = target.removeprefix(_EMULATOR)
+    if board not in TARGETS or board == target:
+        known = ", ".join(_EMULATOR + name for name in TARGETS)
+        raise InputError(f"target '{target}': unknown; choose one of {known}")
+    memory = Flash(flash_file or Path("build/flash") / f"{board}.bin", board)
+    if image is not None or calibration is not None:
+        memory.program(image, calibration)
+    application, present = memory.headers()
+    report: dict[str, str | int] = {
+        "target": target,
+        "flash": str(memory.path),
+        "firmware_version": application.firmware_version,
+        "application_length_bytes": application.length,
+        "calibration_length_bytes": present.length,
+        "model_hash": f"{present.model_hash:08x}",
+        "preset_hash": f"{present.preset_hash:08x}",
+    }
+    if not start:
+        _print(report, json)
+        return 0
+    stop = Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    with Emulation(memory.path, board, port, log) as emulation:
+        _print({**report, "bus": emulation.bus}, json)
+        while emulation.is_running and not stop.wait(_POLL_S):
+            pass
+        ended = not emulation.is_running and not stop.is_set()
+    if ended:
+        raise InputError(f"target '{target}': the emulator ended by itself; see --log FILE")
+    return 0
+
+
+def _print(report: dict[str, str | int], as_json: bool) -> None:
+    if as_json:
+        print(json_module.dumps(report), flush=True)
+        return
+    print(
+        "{flash}: firmware version {firmware_version} ({application_length_bytes} bytes), model "
+        "{model_hash}, preset {preset_hash} ({calibration_length_bytes} bytes)".format(**report)
+    )
+    if "bus" in report:
+        print(f"{report['target']} runs on bus {report['bus']}; Ctrl-C ends it", flush=True)

@@ -1,0 +1,89 @@
+"""`bms monitor`: a live screen of a running system, from what is on its bus."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from contextlib import ExitStack
+from threading import Event
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.live import Live
+
+from hil_sim.bus import require_shared
+from hil_sim.clock import WallClock
+from hil_sim.database import load_database
+from hil_sim.monitor.keyboard import Keyboard
+from hil_sim.monitor.line import status_line
+from hil_sim.monitor.listener import Listener
+from hil_sim.monitor.model import Snapshot, SystemModel
+from hil_sim.monitor.presets import preset_finder
+from hil_sim.monitor.screen import Screen
+from hil_sim.monitor.watch import watch
+
+SCREEN_REFRESH_S = 0.25
+LINE_REFRESH_S = 1.0
+
+
+def monitor(
+    bus: Annotated[
+        str,
+        typer.Option("--bus", help="CAN bus as interface:channel, for example socketcan:vcan0."),
+    ],
+    preset: Annotated[
+        str | None,
+        typer.Option(
+            "--preset",
+            help="Preset of the ECU, for its limits. Default: the shipped one that the ECU names.",
+        ),
+    ] = None,
+    for_s: Annotated[
+        float | None,
+        typer.Option("--for-s", min=0.1, help="End after this time in s. Default: q or Ctrl-C."),
+    ] = None,
+) -> int:
+    """Show state, temperatures against limits, decision, faults and traffic of a running system.
+
+    Listens only: nothing is ever sent. Temperatures in K, currents in A (negative while charging).
+    What has not come is n/a, what comes no more is stale. Where the output is no terminal, prints
+    one line a second. Ends with q or Ctrl-C.
+
+    Example: bms monitor --bus socketcan:vcan0
+    """
+    require_shared(bus)
+    finder = preset_finder(preset)
+    model = SystemModel(load_database())
+    clock = WallClock()
+    stop = Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    start_s = clock.now_s()
+    end_s = float("inf") if for_s is None else start_s + for_s
+    console = Console()
+    is_screen = console.is_terminal and not console.is_dumb_terminal and sys.stdout.isatty()
+    with ExitStack() as stack:
+        listener = stack.enter_context(Listener(bus))
+        keyboard = stack.enter_context(Keyboard())
+        if is_screen:
+            live = stack.enter_context(Live(console=console, screen=True, auto_refresh=False))
+
+        def show(snapshot: Snapshot) -> None:
+            in_force = finder.find(snapshot.identity)
+            if is_screen:
+                live.update(Screen(snapshot, in_force, bus), refresh=True)
+            else:
+                print(status_line(clock.now_s() - start_s, snapshot, in_force), flush=True)
+
+        watch(
+            listener,
+            model,
+            clock,
+            SCREEN_REFRESH_S if is_screen else LINE_REFRESH_S,
+            end_s,
+            lambda: stop.is_set() or keyboard.wants_to_quit(),
+            show,
+        )
+    print(f"watched {bus} for {clock.now_s() - start_s:.1f} s: {model.frames} frames")
+    return 0

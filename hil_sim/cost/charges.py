@@ -1,0 +1,61 @@
+"""Control periods of charges, as records for the counting program."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bms.presets import Preset
+from hil_sim.bus import Frame
+from hil_sim.cost.records import period, restart
+from hil_sim.disturbances import DisturbanceKind
+from hil_sim.logs import read_log
+from hil_sim.nodes.ecu import SYNC_ID
+from hil_sim.recorder import Recorder
+from hil_sim.session import Settings, run_both
+
+SHORT_CHARGE_S = 8.0
+"""Past the growth of the current from 0 to 10C."""
+_COLDEST_ABOVE_BOX_K, _HOTTEST_BELOW_LIMIT_K = 1.0, 5.0
+
+
+def charge_records(settings: Settings) -> list[bytes]:
+    """A charge from the ECU's start, in what the ECU receives. Raises InputError or BusError."""
+    with tempfile.TemporaryDirectory() as name:
+        log = Path(name) / "charge.log"
+        with Recorder(log) as recorder:
+            run_both(settings, recorder)
+        return [restart(), *_periods(log)]
+
+
+def random_charges(preset: Preset, count: int, rng: np.random.Generator) -> Iterator[bytes]:
+    """Beginnings of charges from any temperature that allows one, some into the limits."""
+    coldest_K = preset.operating_box.surface_temperature_K[0] + _COLDEST_ABOVE_BOX_K
+    hottest_K = preset.limits.max_core_temperature_K - _HOTTEST_BELOW_LIMIT_K
+    for _ in range(count):
+        initial = replace(
+            preset.initial,
+            soc=float(rng.uniform(0.0, 0.98)),
+            temperature_K=float(rng.uniform(coldest_K, hottest_K)),
+        )
+        settings = Settings(
+            replace(preset, initial=initial),
+            seed=int(rng.integers(2**31)),
+            disturbance=DisturbanceKind.BANG_BANG,
+            max_time_s=SHORT_CHARGE_S,
+        )
+        yield from charge_records(settings)
+
+
+def _periods(log: Path) -> Iterator[bytes]:
+    frames: list[Frame] = []
+    for frame in read_log(log):
+        if frame.frame_id == SYNC_ID:
+            yield period(frames)
+            frames = []
+        elif not frame.received:
+            frames.append(Frame(frame.frame_id, frame.data))

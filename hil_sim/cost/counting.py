@@ -1,0 +1,30 @@
+"""Runs the counting program on an emulated board."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from bms.errors import InputError
+from hil_sim.cost.records import INSTRUCTION_SHIFT, Counts, counts
+from hil_sim.targets import Emulation
+
+
+def count(program: Path, board: str, records: Iterable[bytes]) -> Counts:
+    """Instructions of each record that is not a restart.
+
+    Raises InputError when the program is not built, QEMU is missing or the board is unknown.
+    """
+    if not program.is_file():
+        raise InputError(f"{program}: not built; run 'make cost'")
+    with tempfile.TemporaryDirectory() as name:
+        inputs, results = Path(name) / "records", Path(name) / "ticks"
+        inputs.write_bytes(b"".join(records))
+        semihosting = f"enable=on,target=native,arg=cost,arg={inputs},arg={results}"
+        options = ("-icount", f"shift={INSTRUCTION_SHIFT}", "-semihosting-config", semihosting)
+        with Emulation(program, board, options=options) as emulation:
+            status = emulation.wait()
+        if status != 0:
+            raise InputError(f"{program}: ended with status {status} on {board}; build it again")
+        return counts(results.read_bytes())

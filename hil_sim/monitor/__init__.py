@@ -1,0 +1,1 @@
+"""A live view of a running system, from what is on its bus."""

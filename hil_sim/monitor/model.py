@@ -1,0 +1,170 @@
+"""The state of a running system as its frames tell it, without a clock or a screen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from codegen import can_database
+from hil_sim.bus import Frame
+from hil_sim.database import MessageCodec, Values
+from hil_sim.monitor.listener import ForeignFrame
+from hil_sim.monitor.traffic import ForeignMeter, ForeignTraffic, MessageMeter, MessageTraffic
+
+SYNC = "SYNC"
+NETWORK_DIAGNOSTICS = "NetworkDiagnostics"
+COUNTS = ("WrongCrcFrames", "WrongLengthFrames", "RepeatedFrames", "LostFrames", "ReorderedFrames")
+MOST_COUNTED = 255
+"""A count that stands for itself or more."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A signal's last value; None when it is not available or has not come yet."""
+
+    value: float | None = None
+    is_stale: bool = False
+
+
+@dataclass(frozen=True)
+class ReceiverReport:
+    """What the ECU says of a message that it receives: E2E state and the COUNTS since its start."""
+
+    frame_id: int
+    name: str
+    state: str | None
+    counts: tuple[int, ...]
+    is_stale: bool
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Which firmware, model and preset the ECU has; hashes as their first hexadecimal digits."""
+
+    firmware_version: int
+    model_hash: str
+    preset_hash: str
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Everything that is known at a time."""
+
+    silence_s: float | None
+    """Time without a good frame of the database in s; None before the first one."""
+    is_silent: bool
+    """Whether that is longer than any of the fast messages may be away."""
+    readings: Mapping[str, Reading]
+    messages: tuple[MessageTraffic, ...]
+    receivers: tuple[ReceiverReport, ...]
+    foreign: ForeignTraffic
+    identity: Identity | None
+    choices: Mapping[str, Mapping[int, str]]
+
+    def name(self, signal: str) -> str | None:
+        """Name of a signal's value, or None when it is not available."""
+        value = self.readings[signal].value
+        return None if value is None else self.choices[signal].get(int(value), f"{value:g}")
+
+    def faults(self, signal: str) -> list[str] | None:
+        """Names of the faults whose bits are set in ActiveFaults or LatchedFaults."""
+        value = self.readings[signal].value
+        if value is None:
+            return None
+        names, bits = self.choices["FirstFault"], int(value)
+        return [names.get(n, str(n)) for n in range(bits.bit_length()) if bits >> n & 1]
+
+    def message(self, name: str) -> MessageTraffic:
+        """Traffic of the message of that name."""
+        return next(message for message in self.messages if message.name == name)
+
+    @property
+    def is_lock_step(self) -> bool:
+        """Whether a SYNC starts each period."""
+        sync = self.message(SYNC)
+        return sync.age_s is not None and not sync.is_stale
+
+
+class SystemModel:
+    """Takes frames with the time at which they came; times in s must not run backwards."""
+
+    def __init__(self, database: Mapping[str, MessageCodec]) -> None:
+        parsed = can_database.load_database()
+        self._meters = {
+            message.frame_id: MessageMeter(
+                database[message.name],
+                1e-3 * can_database.number_attribute(parsed, message, can_database.CYCLE_ATTRIBUTE),
+            )
+            for message in parsed.messages
+        }
+        self._choices = {
+            signal: names for codec in database.values() for signal, names in codec.choices.items()
+        }
+        self._ids = {codec.name: codec.frame_id for codec in database.values()}
+        self._shortest_stale_s = min(meter.stale_s for meter in self._meters.values())
+        self._foreign = ForeignMeter()
+        self._reports: dict[int, tuple[float, Values]] = {}
+        self.frames = 0
+
+    def take(self, time_s: float, frame: Frame | ForeignFrame) -> None:
+        """Count a frame and keep what it says."""
+        self.frames += 1
+        meter = self._meters.get(frame.frame_id) if isinstance(frame, Frame) else None
+        if meter is None or isinstance(frame, ForeignFrame):
+            self._foreign.take(time_s, frame)
+            return
+        values = meter.take(time_s, frame.data)
+        if values is not None and meter.codec.name == NETWORK_DIAGNOSTICS:
+            self._reports[_whole(values["ReportedMessage"])] = time_s, values
+
+    def snapshot(self, now_s: float) -> Snapshot:
+        """What is known at a time in s, not before that of the last frame."""
+        traffic = {id_: meter.traffic(now_s) for id_, meter in self._meters.items()}
+        readings: dict[str, Reading] = {}
+        for frame_id, meter in self._meters.items():
+            is_stale = traffic[frame_id].is_stale
+            for signal in meter.codec.signal_names:
+                readings[signal] = Reading(meter.values.get(signal), is_stale)
+        ages_s = [message.age_s for message in traffic.values() if message.age_s is not None]
+        silence_s = min(ages_s, default=None)
+        return Snapshot(
+            silence_s=silence_s,
+            is_silent=silence_s is not None and silence_s > self._shortest_stale_s,
+            readings=readings,
+            messages=tuple(traffic.values()),
+            receivers=tuple(
+                self._receiver(number, name, now_s)
+                for number, name in sorted(self._choices["ReportedMessage"].items())
+            ),
+            foreign=self._foreign.traffic(now_s),
+            identity=_identity(readings),
+            choices=self._choices,
+        )
+
+    def _receiver(self, number: int, name: str, now_s: float) -> ReceiverReport:
+        time_s, values = self._reports.get(number, (now_s, {}))
+        stale_s = self._meters[self._ids[NETWORK_DIAGNOSTICS]].stale_s
+        state = values.get("ReportedState")
+        return ReceiverReport(
+            frame_id=self._ids[name],
+            name=name,
+            state=None
+            if state is None
+            else self._choices["ReportedState"].get(int(state), f"{state:g}"),
+            counts=tuple(_whole(values[count]) for count in COUNTS) if values else (),
+            # The messages take turns in being reported.
+            is_stale=now_s - time_s > stale_s * len(self._choices["ReportedMessage"]),
+        )
+
+
+def _identity(readings: Mapping[str, Reading]) -> Identity | None:
+    model, preset, version = (
+        readings[signal].value for signal in ("ModelHash", "PresetHash", "FirmwareVersion")
+    )
+    if model is None or preset is None or version is None:
+        return None
+    return Identity(int(version), f"{int(model):08x}", f"{int(preset):04x}")
+
+
+def _whole(value: float | None) -> int:
+    return int(value or 0)

@@ -1,0 +1,52 @@
+"""What an ECU at the end of a serial line reports as lost on that line."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+from hil_sim.bus import CanBus, Frame
+
+LOSS_ID = 0x7F0
+"""Of SLCAN_LINK_LOSS_ID in firmware_c/port/slcan_link.h, which explains the frame."""
+_LATE_S = 0.05
+_MOST_LATE_FRAMES = 100
+_COUNTS = struct.Struct("<II")
+
+
+@dataclass(frozen=True)
+class LineLosses:
+    """Frames lost since the ECU's start for want of room: on the way to it, and from it."""
+
+    to_ecu: int = 0
+    from_ecu: int = 0
+
+    @property
+    def total(self) -> int:
+        """In both directions."""
+        return self.to_ecu + self.from_ecu
+
+    def __str__(self) -> str:
+        return f"the ECU's serial line lost {self.to_ecu} frames to it and {self.from_ecu} from it"
+
+
+class LossWatch:
+    """Notes the latest report among the frames that it passes on."""
+
+    def __init__(self) -> None:
+        self.losses = LineLosses()
+
+    def pass_on(self, frames: list[Frame]) -> list[Frame]:
+        """The same frames."""
+        for frame in frames:
+            if frame.frame_id == LOSS_ID and len(frame.data) == _COUNTS.size:
+                self.losses = LineLosses(*_COUNTS.unpack(frame.data))
+        return frames
+
+    def hear_out(self, bus: CanBus) -> None:
+        """Take in what was said after the last answer."""
+        for _ in range(_MOST_LATE_FRAMES):
+            frame = bus.receive(_LATE_S)
+            if frame is None:
+                return
+            self.pass_on([frame])

@@ -1,0 +1,79 @@
+"""How punctual a real-time run was, as lines of a table and as a histogram."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+
+from hil_sim.punctuality import PlantWatch, Spread, Timing
+from hil_sim.report.chart import CONTROLLER_COLOURS, png
+from hil_sim.report.figures import Figure
+from hil_sim.result import RunResult
+
+_BINS = 60
+_MS_PER_S = 1000.0
+
+
+def timing_figures(results: Sequence[RunResult]) -> list[Figure]:
+    """Lines of the table; none when no run was in real time."""
+    timings = [result.summary.timing for result in results]
+    known = next((timing for timing in timings if timing is not None), None)
+    if known is None:
+        return []
+    line = partial(_line, timings)
+    return [
+        line("Measurements begin late: median", lambda timing: _ms(timing.lateness, "median_ms")),
+        line("Measurements begin late: 99 %", lambda timing: _ms(timing.lateness, "p99_ms")),
+        line(
+            "Measurements begin late: largest",
+            lambda timing: _ms(timing.lateness, "max_ms"),
+            f"{known.deadline_ms:g} ms",
+        ),
+        line("Measurements begin late: jitter", lambda timing: _ms(timing.lateness, "jitter_ms")),
+        line(
+            "Deadlines missed",
+            lambda timing: f"{timing.missed_deadlines} of {timing.periods}",
+        ),
+        line("Command after: median", lambda timing: _ms(timing.answer_latency, "median_ms")),
+        line("Command after: 99 %", lambda timing: _ms(timing.answer_latency, "p99_ms")),
+        line("Command after: largest", lambda timing: _ms(timing.answer_latency, "max_ms")),
+        line("Command after: jitter", lambda timing: _ms(timing.answer_latency, "jitter_ms")),
+        line(
+            "Periods without a new command",
+            lambda timing: f"{timing.periods_without_command}",
+        ),
+        line("Most of them in a row", lambda timing: f"{timing.longest_without_command_periods}"),
+    ]
+
+
+def _line(
+    timings: Sequence[Timing | None], name: str, text: Callable[[Timing], str], limit: str = ""
+) -> Figure:
+    values = ["–" if timing is None else text(timing) for timing in timings]
+    return Figure(name, values, limit, [None] * len(values))
+
+
+def _ms(spread: Spread | None, name: str) -> str:
+    return "–" if spread is None else f"{getattr(spread, name):.2f} ms"
+
+
+def timing_chart(watch: PlantWatch) -> bytes:
+    """PNG with histograms of lateness and of the time to the command; counts on a log scale."""
+    figure = Canvas(figsize=(9.0, 3.2), layout="constrained")
+    late, latency = figure.subplots(1, 2)
+    _histogram(late, watch.slots.late_s, "Measurements later than due (ms)")
+    _histogram(latency, watch.latency_s, "Command after its measurements (ms)")
+    late.set_ylabel("Periods")
+    return png(figure)
+
+
+def _histogram(axes: Axes, times_s: Sequence[float], label: str) -> None:
+    axes.hist(np.asarray(times_s) * _MS_PER_S, bins=_BINS, color=CONTROLLER_COLOURS[0], log=True)
+    axes.set_xlabel(label)
+    axes.set_axisbelow(True)
+    axes.grid(True, axis="y", color="#E4E4E4", lw=0.6)
+    axes.spines[["top", "right"]].set_visible(False)

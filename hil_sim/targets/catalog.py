@@ -1,0 +1,118 @@
+"""The targets by name: where their programs are built, and how to replay recordings on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Protocol
+
+from bms.errors import InputError
+from bms.firmware.calibration import load_pair
+from bms.image import TARGETS as BOARDS
+from bms.image import calibration_part, with_calibration
+from bms.presets import DEFAULT_PRESET
+from hil_sim.bus import open_bus
+from hil_sim.replay.engine import replay
+from hil_sim.replay.identity import choose_pair
+from hil_sim.replay.recording import LAST_MESSAGE, Answer, Recording
+from hil_sim.targets.linux import replay_on_linux
+from hil_sim.targets.qemu import Emulation
+from hil_sim.targets.remote import RemoteEcu
+
+BUILD = Path("build") / "firmware"
+QEMU = "qemu:"
+LINUX = "linux"
+NAMES = (LINUX, *(f"{QEMU}{board}" for board in sorted(BOARDS, reverse=True)))
+
+
+class Target(Protocol):
+    """A place where the firmware runs."""
+
+    @property
+    def name(self) -> str:
+        """One of NAMES."""
+        ...
+
+    def replay(self, recordings: Sequence[Recording]) -> Iterable[list[Answer]]:
+        """What the firmware answers there to each recording in lock step, started anew for each.
+
+        Raises InputError or BusError.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class LinuxTarget:
+    """A process on vcan0."""
+
+    name: str
+    program: Path
+
+    def replay(self, recordings: Sequence[Recording]) -> list[list[Answer]]:
+        """As Target."""
+        return replay_on_linux(self.program, recordings)
+
+
+@dataclass(frozen=True)
+class QemuTarget:
+    """An image on a board in QEMU.
+
+    A recording of another preset or model than the default gets their calibration put into the
+    image.
+    """
+
+    name: str
+    board: str
+    image: Path
+
+    def start(self, log: Path | None = None) -> Emulation:
+        """A freshly started board, a context manager; InputError when there is no QEMU."""
+        return Emulation(self.image, self.board, log=log)
+
+    def replay(self, recordings: Sequence[Recording]) -> Iterator[list[Answer]]:
+        """As Target."""
+        with TemporaryDirectory() as folder:
+            for recording in recordings:
+                last_id = recording.database[LAST_MESSAGE].frame_id
+                image = self._calibrated(recording, Path(folder))
+                with Emulation(image, self.board) as board, open_bus(board.bus) as bus:
+                    yield replay(recording, RemoteEcu(bus, last_id))
+
+    def _calibrated(self, recording: Recording, folder: Path) -> Path:
+        pair = choose_pair(recording, None, None)
+        if pair == (DEFAULT_PRESET, None):
+            return self.image
+        image = folder / self.image.name
+        part = calibration_part(*load_pair(*pair))
+        image.write_bytes(with_calibration(self.image.read_bytes(), part))
+        return image
+
+
+def find_target(name: str, build: Path = BUILD) -> LinuxTarget | QemuTarget:
+    """A target by its name, with what `make firmware` has built for it.
+
+    Raises InputError for an unknown name, and when it has not been built.
+    """
+    if name not in NAMES:
+        raise InputError(f"target '{name}': unknown; choose one of {', '.join(NAMES)}")
+    if name == LINUX:
+        return LinuxTarget(name, _built(build / LINUX / "bms_ecu", LINUX))
+    board = name.removeprefix(QEMU)
+    port = board.replace("-", "_")
+    return QemuTarget(name, board, _built(build / port / "firmware.bin", port))
+
+
+def find_board(name: str, build: Path = BUILD) -> QemuTarget:
+    """The same for a board; InputError for a target that is none."""
+    target = find_target(name, build)
+    if isinstance(target, QemuTarget):
+        return target
+    raise InputError(f"target '{name}': not a board; start it, then 'bms plant' on its bus")
+
+
+def _built(path: Path, port: str) -> Path:
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; run 'make firmware TARGET={port}' first")
+    return path

@@ -1,0 +1,47 @@
+"""The firmware as a process of Linux on a SocketCAN interface, in the guest where there is none."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from bms.errors import BusError, InputError
+from hil_sim.bus import Frame
+from hil_sim.replay.recording import LAST_MESSAGE, Answer, Recording
+
+ROOT = Path(__file__).parents[2]
+GUEST = ROOT / "tools" / "vcan_guest.sh"
+WORKER = Path(__file__).with_name("socketcan_worker.py")
+INTERFACE = "vcan0"
+
+
+def replay_on_linux(program: Path, recordings: Sequence[Recording]) -> list[list[Answer]]:
+    """What a native ECU answers to the frames of recordings in lock step, started anew for each.
+
+    Raises InputError without vcan0 and guest, BusError when the ECU does not end well.
+    """
+    if not GUEST.is_file():
+        raise InputError(f"{GUEST}: no such file; run the command in a checkout of the project")
+    frames = [
+        [[(frame.frame_id, frame.data.hex()) for frame in period.received] for period in r.periods]
+        for r in recordings
+    ]
+    last_id = recordings[0].database[LAST_MESSAGE].frame_id
+    with TemporaryDirectory() as folder:
+        asked, said = Path(folder) / "frames.json", Path(folder) / "answers.json"
+        asked.write_text(json.dumps(frames), encoding="utf-8")
+        worker = [sys.executable, "-S", str(WORKER), str(program.resolve()), INTERFACE]
+        command = [str(GUEST), *worker, str(asked), str(said), str(last_id)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode or not said.is_file():
+            reason = (done.stderr.splitlines() or [f"exit code {done.returncode}"])[-1]
+            raise BusError(f"target 'linux': {reason}")
+        answers = json.loads(said.read_text(encoding="utf-8"))
+    return [
+        [tuple(Frame(frame_id, bytes.fromhex(data)) for frame_id, data in period) for period in log]
+        for log in answers
+    ]

@@ -1,0 +1,131 @@
+"""A microcontroller board in QEMU: starts an image, gives its serial line as a CAN bus, stops."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+
+from bms.errors import InputError
+from bms.image import TARGETS
+
+PROGRAM = "qemu-system-arm"
+HOST = "127.0.0.1"
+_STOP_TIMEOUT_S = 5.0
+
+
+class Emulation:
+    """A running board; a context manager that ends it.
+
+    `bus` is the name under which hil_sim.bus.open_bus reaches its serial line, which one party at
+    a time can use. The line is listened on before the board starts, so that nobody comes too early.
+    """
+
+    def __init__(
+        self,
+        image: Path,
+        target: str,
+        port: int = 0,
+        log: Path | None = None,
+        options: tuple[str, ...] = (),
+    ) -> None:
+        """Start a board with a binary or ELF image; `port` 0 is any that is free.
+
+        What QEMU says goes to `log`, `options` to QEMU. Raises InputError for an unknown target,
+        a missing QEMU or a port that is in use.
+        """
+        if target not in TARGETS:
+            raise InputError(f"target '{target}': unknown; choose one of {', '.join(TARGETS)}")
+        program = shutil.which(PROGRAM)
+        if program is None:
+            raise InputError(f"{PROGRAM}: not installed; run 'apt-get install qemu-system-arm'")
+        with _listening(port) as line:
+            self.port: int = line.getsockname()[1]
+            chardev = f"socket,id=line,fd={line.fileno()},server=on,wait=off"
+            arguments = [program, "-machine", target, "-kernel", str(image)]
+            arguments += ["-display", "none", "-monitor", "none", "-nodefaults"]
+            arguments += ["-chardev", chardev, "-serial", "chardev:line", *options]
+            self._log = subprocess.DEVNULL if log is None else log.open("wb")
+            with _on_one_core(self.port // 2):  # the system gives out odd ports only
+                self._process = subprocess.Popen(
+                    arguments,
+                    stdin=subprocess.DEVNULL,
+                    stdout=self._log,
+                    stderr=subprocess.STDOUT,
+                    pass_fds=(line.fileno(),),
+                )
+
+    @property
+    def bus(self) -> str:
+        """Name of the serial line as a CAN bus."""
+        return f"slcan:socket://{HOST}:{self.port}"
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the board has not ended by itself."""
+        return self._process.poll() is None
+
+    def wait(self) -> int:
+        """Wait until the board ends by itself; its exit code."""
+        return self._process.wait()
+
+    def stop(self) -> None:
+        """Switch the board off."""
+        self._process.terminate()
+        try:
+            self._process.wait(_STOP_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        if not isinstance(self._log, int):
+            self._log.close()
+
+    def __enter__(self) -> Emulation:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+
+@contextmanager
+def _on_one_core(number: int) -> Iterator[None]:
+    """Processes started within stay on one core, by the number modulo the cores.
+
+    QEMU's two threads pass every byte of the line to each other: on one core a control period takes
+    half the time that it takes on two.
+    """
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {sorted(cores)[number % len(cores)]})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, cores)
+
+
+def _listening(port: int) -> socket.socket:
+    line = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    line.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    # Connections inherit this: an answer of a few short lines must not wait for the next.
+    line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    try:
+        line.bind((HOST, port))
+        line.listen(1)
+    except OSError as error:
+        line.close()
+        raise InputError(
+            f"port {port}: cannot be listened on ({error.strerror}); choose another or 0"
+        ) from None
+    return line

@@ -1,0 +1,87 @@
+"""A process that plays recorded frames to a native ECU on a SocketCAN interface; see linux.py.
+
+    python socketcan_worker.py PROGRAM INTERFACE FRAMES ANSWERS LAST_ID
+
+FRAMES is JSON: for each recording, for each control period, the frames [identifier, data] that the
+ECU gets, SYNC the last. ANSWERS becomes the same with what the ECU says. A program is started anew
+for each recording. Uses nothing but the standard library, since imports are slow in the guest.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+_FRAME = struct.Struct("=IB3x8s")
+_RECEIVE_BUFFER_BYTES = 1 << 20
+_ANSWER_S = 10.0
+_MOST_FRAMES = 1000
+_SILENCE_S = "60"
+
+
+def main() -> None:
+    """Run the process; exit code 1 with a line on stderr when an ECU does not end well."""
+    program, interface, frames, answers, last_id = sys.argv[1:]
+    bus = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    bus.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
+    _set_timeout(bus, _ANSWER_S)
+    bus.bind((interface,))
+    recordings = json.loads(Path(frames).read_text(encoding="utf-8"))
+    said = [_play([program, interface], bus, recording, int(last_id)) for recording in recordings]
+    Path(answers).write_text(json.dumps(said), encoding="utf-8")
+
+
+def _play(
+    command: list[str],
+    bus: socket.socket,
+    recording: list[list[tuple[int, str]]],
+    last_id: int,
+) -> list[list[tuple[int, str]]]:
+    with subprocess.Popen(
+        [*command, "--silence-s", _SILENCE_S], stdout=subprocess.PIPE, text=True
+    ) as ecu:
+        try:
+            assert ecu.stdout is not None
+            if "listening" not in ecu.stdout.readline():
+                sys.exit(f"{command[0]}: does not say that it listens")
+            answers = [_answer(bus, period, last_id) for period in recording]
+        finally:
+            ecu.send_signal(signal.SIGTERM)
+        said = ecu.communicate()[0]
+    if ecu.returncode:
+        sys.exit(f"{command[0]}: exit code {ecu.returncode}: {said.strip()}")
+    return answers
+
+
+def _set_timeout(bus: socket.socket, timeout_s: float) -> None:
+    """As bus.settimeout, which costs a second system call for each frame, dear in the guest."""
+    seconds = int(timeout_s)
+    timeval = struct.pack("ll", seconds, int(1e6 * (timeout_s - seconds)))
+    bus.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
+
+
+def _answer(
+    bus: socket.socket, period: list[tuple[int, str]], last_id: int
+) -> list[tuple[int, str]]:
+    for frame_id, data in period:
+        content = bytes.fromhex(data)
+        bus.send(_FRAME.pack(frame_id, len(content), content))
+    answer: list[tuple[int, str]] = []
+    for _ in range(_MOST_FRAMES):
+        try:
+            frame_id, length, content = _FRAME.unpack(bus.recv(_FRAME.size))
+        except BlockingIOError:
+            sys.exit(f"no answer in {_ANSWER_S:g} s")
+        answer.append((frame_id, content[:length].hex()))
+        if frame_id == last_id:
+            break
+    return answer
+
+
+if __name__ == "__main__":
+    main()

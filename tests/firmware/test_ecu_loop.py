@@ -1,0 +1,156 @@
+"""The main loop of every port, in scripted time: lock step, own clock, and the way between them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bms.firmware import Ecu
+from bms.firmware.build import HEADERS
+from bms.presets import DEFAULT_PRESET
+from tests.firmware.bench import HEALTHY, MEASURED, frame
+from tests.firmware.native_library import FIRMWARE, load_library
+
+NATIVE = Path(__file__).parent / "native"
+SOURCES = [
+    *sorted(FIRMWARE.glob("src/*.c")),
+    *sorted(FIRMWARE.glob("generated/*.c")),
+    FIRMWARE / "port" / "ecu_loop.c",
+    NATIVE / "scripted_port.c",
+]
+LOOP_HEADERS = [*(f"include/{name}.h" for name in HEADERS), "port/port.h", "port/ecu_loop.h"]
+SYNC = (0x080, b"")
+COMMAND_ID = 0x180
+PERIOD_MS, SILENCE_MS = 100, 5000
+Frame = tuple[int, bytes]
+
+
+class Port:
+    """A board in scripted time: frames come when the script says, answers are kept with time."""
+
+    def __init__(self, ffi: Any, lib: Any, start_ms: int = 0) -> None:
+        self._ffi, self._lib = ffi, lib
+        self.now_ms = start_ms
+        self.waiting: list[tuple[int, Frame]] = []
+        self.sent: list[tuple[int, Frame]] = []
+        # C keeps the addresses only.
+        self._callbacks = {
+            "receive": ffi.callback("bool(can_frame_t *)", self._receive),
+            "send": ffi.callback("void(const can_frame_t *)", self._send),
+            "time_ms": ffi.callback("uint32_t()", lambda: self.now_ms % 2**32),
+            "idle": ffi.callback("void(uint32_t)", self._idle),
+        }
+        self._functions = ffi.new("scripted_port_t *", self._callbacks)
+        lib.scripted_port_set(self._functions)
+        self._loop = ffi.new("ecu_loop_t *")
+        lib.ecu_loop_init(self._loop, ffi.addressof(lib, "BMS_DEFAULT_CALIBRATION"))
+
+    def run_until(self, time_ms: int) -> None:
+        while self.now_ms < time_ms:
+            self._end_ms = time_ms
+            self._lib.ecu_loop_turn(self._loop)
+
+    def step_times_ms(self) -> list[int]:
+        return [time_ms for time_ms, (frame_id, _) in self.sent if frame_id == COMMAND_ID]
+
+    def _receive(self, frame: Any) -> bool:
+        if not self.waiting or self.waiting[0][0] > self.now_ms:
+            return False
+        _, (frame.id, data) = self.waiting.pop(0)
+        frame.length = len(data)
+        self._ffi.memmove(frame.data, data, len(data))
+        return True
+
+    def _send(self, frame: Any) -> None:
+        self.sent.append((self.now_ms, (frame.id, bytes(frame.data)[: frame.length])))
+
+    def _idle(self, until_ms: int) -> None:
+        left_ms = (until_ms - self.now_ms + 2**31) % 2**32 - 2**31  # may be over already
+        events = [self.now_ms + left_ms, self._end_ms, *(time_ms for time_ms, _ in self.waiting)]
+        self.now_ms = max(self.now_ms, min(events))
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Any]:
+    headers = [*LOOP_HEADERS, str(NATIVE / "scripted_port.h")]
+    ffi, lib = load_library(
+        tmp_path_factory.mktemp("loop"),
+        SOURCES,
+        headers,
+        extra="extern bms_calibration_t BMS_DEFAULT_CALIBRATION;",
+    )
+    return ffi, lib
+
+
+@pytest.fixture(params=[0, 2**32 - 2500], ids=["from 0", "over the clock's end"])
+def port(library: tuple[Any, Any], request: pytest.FixtureRequest) -> Port:
+    return Port(*library, start_ms=request.param)
+
+
+def measurements(period: int) -> list[Frame]:
+    return [frame(name, period, HEALTHY) for name in MEASURED]
+
+
+def test_in_lock_step_it_answers_as_the_ecu_in_this_process(port: Port) -> None:
+    start_ms, periods = port.now_ms, 30
+    for period in range(periods):
+        port.waiting += [(start_ms + 3 * period, f) for f in (*measurements(period), SYNC)]
+    port.run_until(start_ms + 3 * periods)
+    ecu, expected = Ecu(DEFAULT_PRESET), []
+    for period in range(periods):
+        for frame_id, data in (*measurements(period), SYNC):
+            ecu.receive(frame_id, data)
+        ecu.step()
+        expected += [(start_ms + 3 * period, f) for f in ecu.transmit()]
+    assert port.sent == expected
+
+
+def test_before_the_first_frame_it_is_silent(port: Port) -> None:
+    port.run_until(port.now_ms + 10_000)
+    assert port.sent == []
+
+
+def test_without_sync_the_first_frame_sets_the_phase(port: Port) -> None:
+    first_ms = port.now_ms + 1234
+    port.waiting = [(first_ms + n, f) for n, f in enumerate(measurements(0))]
+    port.run_until(first_ms + 1000)
+    assert port.step_times_ms() == [first_ms + 50 + PERIOD_MS * n for n in range(10)]
+
+
+def test_sync_takes_over_from_the_clock(port: Port) -> None:
+    start_ms = port.now_ms
+    port.waiting = [(start_ms, measurements(0)[0]), (start_ms + 170, SYNC), (start_ms + 900, SYNC)]
+    port.run_until(start_ms + 2000)
+    assert port.step_times_ms() == [start_ms + 50, start_ms + 150, start_ms + 170, start_ms + 900]
+
+
+def test_when_sync_falls_silent_the_clock_steps_on_and_commands_no_current(port: Port) -> None:
+    start_ms = port.now_ms
+    port.waiting = [(start_ms, SYNC)]
+    port.run_until(start_ms + SILENCE_MS + 950)
+    silent = [start_ms + SILENCE_MS + PERIOD_MS * n for n in range(10)]
+    assert port.step_times_ms() == [start_ms, *silent]
+    ecu = Ecu(DEFAULT_PRESET)
+    ecu.step()
+    no_current = dict(ecu.transmit())[COMMAND_ID][2:]
+    assert port.sent[-1][1][1][2:] == no_current
+
+
+def test_after_a_stall_missed_periods_are_not_caught_up(port: Port) -> None:
+    start_ms = port.now_ms
+    port.waiting = [(start_ms, measurements(0)[0])]
+    port.run_until(start_ms + 100)
+    port.now_ms += 1000
+    port.run_until(start_ms + 1350)
+    late_ms = start_ms + 1100
+    assert port.step_times_ms() == [start_ms + 50, late_ms, late_ms, late_ms + 100, late_ms + 200]
+
+
+def test_frames_without_end_do_not_stop_the_clock(port: Port) -> None:
+    start_ms = port.now_ms
+    endless = measurements(0)[0]
+    port.waiting = [(start_ms + n // 20, endless) for n in range(20 * 300)]
+    port.run_until(start_ms + 300)
+    assert port.step_times_ms() == [start_ms + 50, start_ms + 150, start_ms + 250]

@@ -1,0 +1,128 @@
+"""What is damaged, truncated, foreign or stale is refused, by boot stage and host alike."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bms.errors import InputError
+from bms.image import Header, check_image
+from tests.firmware.damaged_images import (
+    APPLICATION,
+    BOARD,
+    BOOT,
+    CALIBRATION,
+    HEADER_LENGTH,
+    BootStage,
+    damaged_images,
+    flipped,
+)
+from tests.firmware.native_library import FIRMWARE, load_library
+from tests.firmware.ports import image, needs_compiler
+
+pytestmark = needs_compiler
+
+SOURCES = [FIRMWARE / "image" / "image.c"]
+HEADERS = [f"include/{name}.h" for name in ("kan", "rcbf", "thermal", "calibration")]
+HEADERS.append("image/image.h")
+SAMPLE = 1500
+
+# (replaced text, replacement): each takes one check away.
+MUTANTS = {
+    "the boot stage's CRC": ("== *crc32) ? IMAGE_OK : IMAGE_WRONG_CRC", "== *crc32) ? IMAGE_OK : IMAGE_OK"),
+    "all of the boot stage": ("image_crc32(place->bytes, covered)", "*crc32"),
+    "magic": ("(header->magic != magic)", "(header->magic == 0u)"),
+    "shortest length": ("(header->length < shortest)", "(header->length < 16u)"),
+    "longest length": ("(header->length > place->length)", "(header->length > place->length + 4u)"),
+    "CRC": ("        header->crc32) {\n        return IMAGE_WRONG_CRC;", "        header->crc32) {\n"),
+    "CRC up to the end": ("header->length - (uint32_t)CRC_COVERS_FROM)", "64u)"),
+    "header layout": ("(header->header_layout == IMAGE_HEADER_LAYOUT) ? IMAGE_OK :", "true ? IMAGE_OK :"),
+    "target": ("if (header->target != target)", "if (target == 0u)"),
+    "stack": ("(is_stack_right && is_start_right)", "is_start_right"),
+    "stack alignment": ("(stack_top % STACK_ALIGNMENT == 0u) &&", ""),
+    "within RAM": ("return address - start < length;", "return address < start + length;"),
+    "start": ("(is_stack_right && is_start_right)", "is_stack_right"),
+    "Thumb code": ("((start & THUMB_BIT) != 0u) &&", ""),
+    "start in the part": ("header->length - IMAGE_VECTORS_OFFSET);", "place->length);"),
+    "calibration layout": ("(header->calibration_layout != application->calibration_layout) ||", ""),
+    "calibration length": ("||\n        (header->length != application->calibration_length)", ""),
+    "firmware version": ("if (header->firmware_version != application->firmware_version)", "if (false)"),
+    "model": ("(calibration->model_hash == header->model_hash) &&", ""),
+    "preset": ("&&\n            (calibration->preset_hash == header->preset_hash)", ""),
+    "block layout": ("(calibration->layout == header->calibration_layout) &&", ""),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def boot_stage(tmp_path_factory: pytest.TempPathFactory) -> BootStage:
+    return BootStage(*load_library(tmp_path_factory.mktemp("image"), SOURCES, HEADERS))
+
+
+def host_takes(content: bytes) -> bool:
+    try:
+        check_image(content, BOARD, "image")
+    except InputError as error:
+        assert "\n" not in str(error) and "; " in str(error), "one line with a remedy"
+        return False
+    return True
+
+
+def test_the_image_as_built_is_taken(boot_stage: BootStage) -> None:
+    assert boot_stage.verdict(image()) == ("", "OK")
+    assert host_takes(image())
+
+
+def test_each_check_refuses_what_it_is_for_and_so_does_the_host(boot_stage: BootStage) -> None:
+    for name, damaged in damaged_images(image()).items():
+        assert boot_stage.verdict(damaged.image) == (damaged.part, damaged.status), name
+        assert not host_takes(damaged.image), name
+
+
+@pytest.mark.parametrize("region", [APPLICATION, CALIBRATION], ids=["application", "calibration"])
+def test_every_bit_of_a_header_is_protected(boot_stage: BootStage, region: Any) -> None:
+    start = 8 * region.address
+    for bit in range(start, start + 8 * HEADER_LENGTH):
+        damaged = flipped(image(), bit)
+        assert boot_stage.verdict(damaged) != ("", "OK"), f"bit {bit - start}"
+        assert not host_takes(damaged), f"bit {bit - start}"
+
+
+def test_no_bit_of_a_large_sample_goes_unnoticed(boot_stage: BootStage) -> None:
+    content, draw = image(), random.Random(1)
+    used_end = APPLICATION.address + Header.parse(content[APPLICATION.address :]).length
+    for bit in draw.sample(range(8 * len(content)), SAMPLE):
+        damaged = flipped(content, bit)
+        assert not host_takes(damaged), f"bit {bit}"
+        if not used_end <= bit // 8 < APPLICATION.end:  # erased room is no part
+            assert boot_stage.verdict(damaged) != ("", "OK"), f"bit {bit}"
+
+
+def test_no_truncated_or_longer_image_is_taken(boot_stage: BootStage) -> None:
+    content, draw = image(), random.Random(2)
+    ends = {0, 1, BOOT.end, APPLICATION.end, CALIBRATION.address + 1, len(content) - 1}
+    for end in ends | set(draw.sample(range(len(content)), 100)):
+        assert not host_takes(content[:end]), f"{end} bytes"
+        # Of what is cut off, erased flash stays; a last byte that looks erased is no loss.
+        if content[end:].strip(b"\xff"):
+            assert boot_stage.verdict(content[:end]) != ("", "OK"), f"{end} bytes"
+    for tail in (b"\xff", b"\x00", content):
+        assert not host_takes(content + tail)
+
+
+def test_noise_is_refused(boot_stage: BootStage) -> None:
+    draw = random.Random(3)
+    for length in (0, 40, 10_000, len(image())):
+        noise = draw.randbytes(length)
+        assert boot_stage.verdict(noise) != ("", "OK")
+        assert not host_takes(noise)
+
+
+@pytest.mark.parametrize("check", MUTANTS)
+def test_a_check_that_is_taken_away_is_missed(check: str, tmp_path: Path) -> None:
+    change = ("image.c", *MUTANTS[check])
+    broken = BootStage(*load_library(tmp_path, SOURCES, HEADERS, change))
+    found = {name: (d, broken.verdict(d.image)) for name, d in damaged_images(image()).items()}
+    assert any(verdict != (d.part, d.status) for d, verdict in found.values()), "nobody noticed"

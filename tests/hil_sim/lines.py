@@ -1,0 +1,58 @@
+"""The other end of an slcan line in a thread, for tests of this end."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from threading import Thread
+from types import TracebackType
+
+Answer = Callable[[bytes], bytes]
+
+
+class Line:
+    """Listens on a free port; `answer` gets each line of text and gives the bytes to send back."""
+
+    def __init__(self, answer: Answer) -> None:
+        self._answer = answer
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.bus = f"slcan:socket://127.0.0.1:{self._listener.getsockname()[1]}"
+        self.chunks: list[bytes] = []
+        self._thread = Thread(target=self._serve, daemon=True)
+
+    def _serve(self) -> None:
+        connection, _ = self._listener.accept()
+        begun = b""
+        with connection:
+            while chunk := connection.recv(1 << 16):
+                self.chunks.append(chunk)
+                *lines, begun = (begun + chunk).split(b"\r")
+                said = b"".join(self._answer(line) for line in lines)
+                if said == b"hang up":
+                    return
+                connection.sendall(said)
+
+    def __enter__(self) -> Line:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._listener.close()
+        self._thread.join(5.0)
+
+
+def text(frame_id: int, data: bytes) -> bytes:
+    """A frame as slcan writes it."""
+    return b"t%03X%d%s\r" % (frame_id, len(data), data.hex().upper().encode())
+
+
+def frame(line: bytes) -> tuple[int, bytes] | None:
+    """Identifier and data of a line; None for a command."""
+    if line[:1] != b"t":
+        return None
+    return int(line[1:4], 16), bytes.fromhex(line[5:].decode())

@@ -1,0 +1,198 @@
+"""`bms bench` compares before it times, times what it says, and names what it did not run."""
+
+import json
+import statistics
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from bms.cell import CellState, integrate_step
+from bms.presets import DEFAULT_PRESET, load_preset
+from hil_sim.bench import simulation
+from hil_sim.bench.layers import sampled
+from hil_sim.bench.problem import charge_problem
+from hil_sim.bench.race import Absent, Clocks, Peer, Spread, WrongAnswerError, race
+from hil_sim.bench.simulation import bus_speed
+from tests.firmware.constraints import interval, quadratics
+
+RIGHT = np.array([1.0, 2.0, 3.0, 4.0])
+PEERS = ("KAN in C", "KAN in SciPy, one at a time", "SciPy SLSQP", "OSQP, warm update and solve")
+
+
+def ticks(*durations_ns):
+    """A clock that is read twice a repetition, with these times in between."""
+    now = 0
+    for duration_ns in durations_ns:
+        yield now
+        now += duration_ns
+        yield now
+
+
+def peer(answers, rows=None, tolerance=0.5):
+    return Peer("peer", "package 1", lambda: np.asarray(answers), tolerance, rows)
+
+
+def test_time_is_the_median_of_the_repetitions_for_each_answer():
+    durations_ns = (400, 800, 4000, 80, 1200)
+    clock = ticks(*durations_ns)
+    (row,) = race(RIGHT, [peer(RIGHT)], 5, lambda: next(clock))
+    per_answer = [duration / 4 for duration in durations_ns]
+    low, median, high = statistics.quantiles(per_answer, n=4, method="inclusive")
+    assert row.time_ns == Spread(median, low, high, 5)
+    assert row.answers == 4
+
+
+def test_a_peer_may_answer_some_of_the_problems():
+    clock = ticks(20)
+    (row,) = race(RIGHT, [peer([2.1, 4.0], rows=np.array([1, 3]))], 1, lambda: next(clock))
+    assert row.time_ns.median == 10
+    assert row.largest_difference == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("answers", [[1.0, 2.0, 3.0, 4.6], [1.0, float("nan"), 3.0, 4.0]])
+def test_a_peer_that_answers_wrongly_is_refused_before_it_is_timed(answers):
+    with pytest.raises(WrongAnswerError, match="peer"):
+        race(RIGHT, [peer(RIGHT), peer(answers)], 1, iter([0, 1]).__next__)
+
+
+def test_an_absent_peer_stays_in_the_table():
+    absent = Absent("other", "not installed")
+    assert race(RIGHT, [absent], 1, lambda: 0) == [absent]
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return charge_problem(DEFAULT_PRESET, 400.0)
+
+
+def test_the_solvers_are_given_the_printed_constraints(problem):
+    """Against the constraints as design page 1 prints them, in code of their own."""
+    for row in problem.spread(40):
+        state = {name: column[row] for name, column in problem.states._asdict().items()}
+        state["cooling_power_W"] = problem.cooling_power_W[row]
+        groups = quadratics(problem.firmware.parameters, state)
+        for side in problem.quadratics[row]:
+            assert any(side == pytest.approx(other, abs=1e-9) for g in groups for other in g)
+        lower_A, upper_A = interval(groups, problem.reference_current_A)
+        assert problem.lower_A[row] == pytest.approx(lower_A, abs=1e-6)
+        assert problem.upper_A[row] == pytest.approx(upper_A, abs=1e-6)
+    assert problem.lower_A.min() == problem.reference_current_A < problem.lower_A.max() - 1.0
+
+
+def test_every_way_to_the_same_answer_is_compared_timed_and_named(bms):
+    code, out, _ = bms(
+        "bench", "--quick", "--json", "--section", "estimate", "--section", "decision",
+        "--section", "period",
+    )  # fmt: skip
+    assert code == 0
+    result = json.loads(out)
+    assert result["pinned_to_core"] is not None
+    assert set(result["machine"]) == {"cpu", "cores", "system", "python", "load_average"}
+    rows = {row["name"]: row for key in ("estimate", "decision") for row in result[key]}
+    assert set(PEERS) <= set(rows)
+    assert any("pykan" in name for name in rows)
+    assert any("CVXPYgen" in name for name in rows)
+    for row in rows.values():
+        if "not_run" in row:
+            assert "pip install" in row["not_run"]
+            continue
+        quartiles = row["lower_quartile_time_ns"], row["upper_quartile_time_ns"]
+        assert 0.0 < quartiles[0] <= row["median_time_ns"] <= quartiles[1]
+        assert row["package"].split()[1]
+        assert row["answers_a_repetition"] >= 100
+    assert rows["KAN in C"]["largest_difference_K"] < 1e-3
+    assert rows["SciPy SLSQP"]["largest_difference_A"] < 1e-2
+    (period,) = result["period"]
+    assert period["answers_a_repetition"] == 2505
+    both_ns = rows["KAN in C"]["median_time_ns"] + rows["closed form in C"]["median_time_ns"]
+    (aim,) = (aim for aim in result["aims"] if aim["unit"] == "ns")
+    assert aim["measured"] == both_ns
+    assert aim["is_reached"] == (both_ns <= 100.0)
+    assert result["simulation"] == result["campaign"] == []
+
+
+def test_answers_that_differ_end_in_exit_code_1_with_the_names(bms, monkeypatch):
+    monkeypatch.setattr("hil_sim.bench.decision.SOLVER_TOLERANCE_A", 0.0)
+    code, out, err = bms("bench", "--quick", "--section", "decision")
+    assert (code, out) == (1, "")
+    assert err.startswith("bms: OSQP, set-up and solve: answers ")
+
+
+def test_what_is_not_installed_is_named_with_the_remedy(bms, monkeypatch):
+    monkeypatch.delitem(sys.modules, "hil_sim.bench.torch_estimate", raising=False)
+    for module in ("osqp", "torch"):
+        monkeypatch.setitem(sys.modules, module, None)
+    code, out, _ = bms("bench", "--quick", "--section", "decision", "--section", "estimate")
+    assert code == 0
+    assert "not run: OSQP: not installed; pip install osqp" in out
+    assert "pip install pykan" in out
+    assert "SciPy SLSQP" in out
+
+
+def test_simulation_tells_its_speed_and_what_it_spends_time_on(bms):
+    code, out, _ = bms(
+        "bench", "--quick", "--json", "--section", "simulation",
+        "--bus", "virtual:bench-test", "--bus", "nonsense:1",
+    )  # fmt: skip
+    assert code == 0
+    virtual, nonsense = json.loads(out)["simulation"]
+    assert virtual["periods"] == 204
+    assert virtual["median_speed_times_real_time"] > 1.0
+    assert sum(virtual["layer_shares_percent"].values()) == pytest.approx(100.0)
+    assert "choose an interface that python-can knows" in nonsense["not_run"]
+
+
+def test_speed_leaves_out_the_time_before_the_first_answer():
+    wall = iter([10_000_000_000, *range(11_000_000_000, 99_000_000_000, 10_000_000)])
+    cpu = iter([3_000_000_000, 3_000_000_000 + 285_000_000, 0, 0])
+    clocks = Clocks(wall.__next__, cpu.__next__)
+    speed = bus_speed("virtual:bench-clock", DEFAULT_PRESET, 1.0, 1, clocks)
+    periods = speed.periods
+    measured_s = 1.0 + (periods - 2) * 0.01
+    assert speed.times_real_time.median == pytest.approx((periods - 1) * 0.1 / measured_s)
+    assert speed.processor_share_percent == pytest.approx(28.5 / measured_s)
+
+
+def test_a_layer_is_charged_with_what_happens_below_it():
+    cell = load_preset(DEFAULT_PRESET).cell
+    with sampled() as layers:
+        state = CellState(0.5, 300.0, 300.0, 300.0)
+        for _ in range(20_000):
+            state = integrate_step(cell, state, -1.0, 1.0, 0.01)
+    assert layers.shares_percent["cell model"] > 80.0
+
+
+def test_without_the_guest_a_socketcan_bus_is_not_run(monkeypatch, tmp_path):
+    monkeypatch.setattr(simulation, "GUEST", tmp_path / "vcan_guest.sh")
+    speed = bus_speed("socketcan:nothere0", DEFAULT_PRESET, 1.0, 1, Clocks(int, int))
+    assert speed.times_real_time is None
+    assert "no vcan_guest.sh" in speed.not_run
+
+
+def test_a_campaign_tells_its_throughput(bms):
+    code, out, _ = bms(
+        "bench", "--json", "--section", "campaign", "--campaign-runs", 2, "--campaign-runs", 4,
+        "--jobs", 1,
+    )  # fmt: skip
+    assert code == 0
+    rows = json.loads(out)["campaign"]
+    assert [row["runs"] for row in rows] == [2, 4]
+    for row in rows:
+        assert row["runs_per_s"] == pytest.approx(row["runs"] / row["wall_time_s"])
+    first, second = (row["wall_time_s"] / row["runs"] for row in rows)
+    assert rows[0]["time_a_run_relative_to_first"] == 1.0
+    assert rows[1]["time_a_run_relative_to_first"] == pytest.approx(second / first)
+
+
+def test_the_guest_runs_the_same_and_answers_in_json():
+    done = subprocess.run(
+        [sys.executable, "-m", "hil_sim.bench", "virtual:guest", DEFAULT_PRESET, "1.0", "2"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    speed = json.loads(done.stdout)
+    assert speed["bus"] == "virtual:guest"
+    assert speed["times_real_time"]["repetitions"] == 2

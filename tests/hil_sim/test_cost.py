@@ -1,0 +1,121 @@
+"""Instructions on an emulated board: counted exactly, repeatably, and within the budget."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bms.presets import load_preset
+from hil_sim.cost.counting import count
+from hil_sim.cost.measure import measure_cost
+from hil_sim.cost.records import State, counts, period, restart, state
+
+ROOT = Path(__file__).parents[2]
+FPU = "mps2-an386"
+HAS_TOOLS = shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")
+pytestmark = pytest.mark.skipif(
+    not (HAS_TOOLS or "CI" in os.environ),
+    reason="not run: needs gcc-arm-none-eabi and qemu-system-arm; see tools/debian_packages.sh",
+)
+BUDGET = 1500
+WARM = State(-20.0, 0.8, 312.0, 303.0, 315.0, 0.4, -23.0)
+
+
+def build(folder: Path, board: str, root: Path = ROOT) -> Path:
+    """The counting program of a board."""
+    name = board.replace("-", "_")
+    program = folder / "cost.elf"
+    make = ["make", "-s", "-f", f"firmware_c/port/{name}/port.mk", f"BUILD={folder}"]
+    done = subprocess.run(
+        [*make, f"PYTHON={sys.executable}", str(program)],
+        cwd=root, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return program
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory) -> Path:
+    return build(tmp_path_factory.mktemp("cost"), FPU)
+
+
+def test_a_thousand_instructions_count_as_a_thousand(tmp_path):
+    shutil.copytree(ROOT / "firmware_c", tmp_path / "firmware_c")
+    source = tmp_path / "firmware_c" / "cost" / "cost.c"
+    text = source.read_text()
+    start = text.index("    cost->result = kan_evaluate")
+    end = text.index(";", start) + 1
+    nops = '    (void)cost;\n    __asm__ volatile(".rept 1000\\n nop\\n .endr");'
+    source.write_text(text[:start] + nops + text[end:])
+    counted = count(build(tmp_path / "build", FPU, tmp_path), FPU, [state(WARM)])
+    # The empty work stores a result, which takes an instruction or two.
+    assert abs(int(counted.estimate[0]) - 1000) <= 3
+    assert counted.decision[0] > 100
+
+
+def test_counts_are_repeatable_and_belong_to_their_record(program):
+    cold = WARM._replace(surface_temperature_K=280.0, core_temperature_K=500.0)
+    alone = [count(program, FPU, [state(one)]) for one in (WARM, cold)]
+    together = count(program, FPU, [state(WARM), restart(), state(cold), state(WARM)])
+    for kind in ("estimate", "decision"):
+        first, second = (int(getattr(counted, kind)[0]) for counted in alone)
+        assert getattr(together, kind).tolist() == [first, second, first]
+    # A core of 500 K is refused before anything is solved.
+    assert alone[1].decision[0] < alone[0].decision[0] / 3
+    assert together.period.tolist() == [0, 0, 0]
+
+
+def test_estimate_and_decision_stay_within_the_budget_everywhere_the_search_goes(program):
+    report = measure_cost(program, FPU, load_preset("paper_calibrated"), 1, 10, 1000)
+    both, whole = report.costs["estimate_and_decision"], report.costs["control_period"]
+    assert both.worst <= BUDGET
+    assert both.charge_minimum <= both.charge_median <= both.charge_worst <= both.worst
+    assert both.worst <= report.costs["estimate"].worst + report.costs["decision"].worst
+    assert whole.charge_minimum > both.charge_worst
+    periods = load_preset("paper_calibrated").timing.sampling_period_s
+    assert len(report.series["control_period"][report.charging]) * periods > 700.0
+
+
+def test_the_command_prints_every_figure_and_fails_beyond_its_limit(
+    bms, program, tmp_path, monkeypatch
+):
+    folder = tmp_path / "build" / "firmware" / "mps2_an386"
+    folder.mkdir(parents=True)
+    shutil.copy(program, folder)
+    monkeypatch.chdir(tmp_path)
+    run = ("cost", "--target", f"qemu:{FPU}", "--charges", "1", "--states", "50", "--json")
+    status, output, errors = bms(*run, "--out", "cost.png", "--limit", "100")
+    assert status == 1
+    assert "instructions, allowed 100" in errors
+    figures = json.loads(output)[0]
+    assert (figures["board"], figures["unit"]) == (FPU, "instructions")
+    assert figures["estimate"]["worst"] > 100
+    assert (tmp_path / "cost.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_wrong_use_is_one_line(bms, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for arguments, words in (
+        (("--target", "mps2-an386"), "write qemu:BOARD"),
+        (("--target", f"qemu:{FPU}"), "run 'make cost'"),
+    ):
+        status, _, errors = bms("cost", *arguments)
+        assert status == 2
+        assert words in errors
+        assert errors.count("\n") == 1
+
+
+def test_records_hold_exactly_the_frames_of_a_period():
+    with pytest.raises(ValueError, match="4 frames, not 0"):
+        period([])
+
+
+def test_ticks_of_the_timer_become_instructions():
+    ticks = b"".join(n.to_bytes(4, "little") for n in (10, 26, 1610, 10))
+    assert [values.tolist() for values in counts(ticks)] == [[10], [1000], [0]]

@@ -1,0 +1,300 @@
+"""One firmware in three places: host, native process on vcan, and microcontrollers in QEMU.
+
+All have to say the same, byte for byte. How a difference is found and named is tested with targets
+that differ in one bit.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import shutil
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from bms.errors import BusError, InputError
+from bms.firmware import Ecu
+from bms.firmware.calibration import load_pair
+from bms.kan.model_file import shipped_model_path
+from hil_sim.bus import Frame, open_bus
+from hil_sim.faults.runner import MatrixSettings
+from hil_sim.replay.engine import replay
+from hil_sim.targets.agreement import compare_targets
+from hil_sim.targets.catalog import NAMES, LinuxTarget, QemuTarget
+from hil_sim.targets.remote import RemoteEcu
+from hil_sim.targets.scenarios import (
+    FULL_CHARGE,
+    load_scenarios,
+    record_scenarios,
+    why_not_played,
+)
+from tests.firmware.ports import ROOT, build_variant, built, needs_emulator
+from tests.hil_sim.golden.record import FOLDER, SCENARIOS
+from tests.hil_sim.lines import Line
+from tests.hil_sim.test_faults_matrix import ROWS
+from tests.hil_sim.test_vcan import HAS_GUEST, HAS_VCAN, MISSING
+
+HAS_BOARDS = not needs_emulator.args[0]
+HAS_LINUX = HAS_VCAN or HAS_GUEST or "CI" in os.environ
+needs_vcan = pytest.mark.skipif(not HAS_LINUX, reason=MISSING)
+SEED = 5
+SOFT_FLOAT, HARD_FLOAT = "mps2_an385", "mps2_an386"
+# A process has the calibration that it was compiled with; images get that of the log.
+OTHER_CALIBRATION = ("lagged_model", "lin2014_hot")
+FAULTS = (
+    "lost once: CellThermal",
+    "lost for good: ChargeRequest",
+    "two frames swapped: CellThermal",
+    "corrupted for good: CellElectrical byte 3",
+    "wrong length: Coolant, length 3",
+    "bus off for a second",
+    "flood at full load: between",
+    "sensor not available: surface_temperature_K",
+    "current sensor disagrees with the command: offset 3.0",
+    "charger ignores commands",
+)
+HOT = FOLDER / "hot_derating.log.gz"
+
+
+def board(port, folder=None):
+    image = (folder or built(port)) / "firmware.bin"
+    name = port.replace("_", "-")
+    return QemuTarget(f"qemu:{name}", name, image)
+
+
+def linux():
+    return LinuxTarget("linux", built("linux") / "bms_ecu")
+
+
+def play(work):
+    """Agreements of several targets, each with scenarios of its own, side by side."""
+    with ThreadPoolExecutor(len(work)) as pool:
+        return list(pool.map(lambda one: compare_targets([one[0]], one[1])[0], work))
+
+
+@pytest.fixture(scope="module")
+def charge_and_faults():
+    settings = MatrixSettings(*load_pair("paper_calibrated", None), seed=SEED)
+    return record_scenarios(settings, [row for row in ROWS if row.name in FAULTS])
+
+
+@pytest.fixture(scope="module")
+def golden():
+    return {name: load_scenarios([FOLDER / f"{name}.log.gz"])[0] for name in SCENARIOS}
+
+
+@pytest.fixture(scope="module")
+def places(charge_and_faults, golden):
+    """Every target that there is on this machine with what it played.
+
+    The full charge of the microcontroller with floating point is in test_pil, in closed loop.
+    """
+    charge, *faults = charge_and_faults
+    assert charge.name == FULL_CHARGE
+    own = [scenario for name, scenario in golden.items() if name not in OTHER_CALIBRATION]
+    other = [golden[name] for name in OTHER_CALIBRATION]
+    work = []
+    if HAS_LINUX:
+        work.append((linux(), [*charge_and_faults, *own]))
+    if HAS_BOARDS:
+        work.append((board(HARD_FLOAT), [*faults, *golden.values()]))
+        work.append((board(SOFT_FLOAT), [charge, golden["sensor_fault"], *other]))
+    return {by_target[0].target: by_target for by_target in play(work)}
+
+
+def differing(agreements):
+    return {
+        one.scenario.name: one.comparison.first.signals
+        for one in agreements
+        if not one.comparison.is_equal
+    }
+
+
+@needs_vcan
+def test_a_native_process_on_vcan_says_the_same(places):
+    assert differing(places["linux"]) == {}
+    assert len(places["linux"]) == 1 + len(FAULTS) + len(SCENARIOS) - len(OTHER_CALIBRATION)
+
+
+@needs_vcan
+def test_a_native_process_with_another_model_says_the_same(golden, tmp_path, bms):
+    model = shipped_model_path("paper_calibrated", lagged=True)
+    assert bms("export", "--model", model, "--out", tmp_path / "export")[0] == 0
+    folder = build_variant("linux", tmp_path, f"GENERATED={tmp_path / 'export'}")
+    target = LinuxTarget("linux", folder / "bms_ecu")
+    (agreements,) = compare_targets([target], [golden["lagged_model"]])
+    assert differing(agreements) == {}
+
+
+@needs_emulator
+def test_a_microcontroller_with_floating_point_says_the_same(places):
+    assert differing(places["qemu:mps2-an386"]) == {}
+    assert len(places["qemu:mps2-an386"]) == len(FAULTS) + len(SCENARIOS)
+
+
+@needs_emulator
+def test_a_microcontroller_without_floating_point_says_the_same(places):
+    assert differing(places["qemu:mps2-an385"]) == {}
+    assert len(places["qemu:mps2-an385"]) == 2 + len(OTHER_CALIBRATION)
+
+
+@needs_emulator
+def test_a_fused_multiply_add_is_found_and_named(tmp_path, bms):
+    """The hardware has one; the C standard lets a compiler use it unless told not to."""
+    fused = "NUMERICS=-ffp-contract=fast -fno-math-errno"
+    build_variant(HARD_FLOAT, tmp_path, fused)
+    arguments = [HOT, "--target", "qemu:mps2-an386", "--build", tmp_path]
+    code, out, _ = bms("compare-targets", *arguments, "--json")
+    assert code == 1
+    (scenario,) = json.loads(out)["scenarios"]
+    first = scenario["targets"]["qemu:mps2-an386"]["first_difference"]
+    assert first["period"] > 0
+    frame = first["frames"][0]
+    assert frame["host"] != frame["target"]
+    signal = first["differing_signals"][0]
+    (key,) = (key for key in first["host"] if key.startswith(signal))
+    assert first["host"][key] == pytest.approx(first["target"][key], rel=1e-2)
+    code, out, _ = bms("compare-targets", *arguments)
+    assert code == 1
+    assert (
+        f"hot_derating.log.gz on qemu:mps2-an386: first difference in period {first['period']}"
+        in out
+    )
+    assert f"frame {frame['id']} {frame['message']}: host {frame['host']}, " in out
+    assert f"qemu:mps2-an386 {frame['target']}" in out
+    assert f"* {signal} " in out
+
+
+@needs_emulator
+def test_a_constant_that_is_one_bit_off_is_found(tmp_path):
+    shutil.copytree(ROOT / "firmware_c", tmp_path / "firmware_c")
+    source = tmp_path / "firmware_c" / "generated" / "calibration_default.c"
+    text = source.read_text()
+    before, after = ".capacity_As = 8280.0f", ".capacity_As = 8284.0f"
+    assert before in text, "the mutant no longer applies; bring it up to date"
+    source.write_text(text.replace(before, after))
+    folder = build_variant(HARD_FLOAT, tmp_path / "build", tree=tmp_path)
+    ((agreement,),) = compare_targets([board(HARD_FLOAT, folder)], load_scenarios([HOT]))
+    assert "StateOfCharge" in agreement.comparison.first.signals
+
+
+@dataclass(frozen=True)
+class Altered:
+    """The firmware of this process, whose answer in one period is another."""
+
+    change: object
+    period: int = 100
+    name: str = "altered"
+
+    def replay(self, recordings):
+        for recording in recordings:
+            answers = replay(recording, Ecu("paper_calibrated"))
+            answers[self.period] = tuple(self.change(list(answers[self.period])))
+            yield answers
+
+
+def flip(position, bit):
+    def change(answer):
+        data = bytearray(answer[0].data)
+        data[position] ^= 1 << bit
+        return [Frame(answer[0].frame_id, bytes(data)), *answer[1:]]
+
+    return change
+
+
+@pytest.mark.parametrize("bit", range(8))
+@pytest.mark.parametrize("position", range(8))
+def test_every_bit_counts(golden_start, position, bit):
+    ((agreement,),) = compare_targets([Altered(flip(position, bit))], golden_start)
+    (frame,) = agreement.frames
+    assert agreement.comparison.first.period == 100
+    assert agreement.comparison.differing_periods == 1
+    assert (frame.frame_id, frame.message) == (0x181, "Estimate")
+    assert frame.host[position] ^ frame.target[position] == 1 << bit
+    assert agreement.comparison.first.signals
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda answer: answer[:-1], {"ChargeCommand"}),
+        (lambda answer: [*answer, Frame(0x7F0, b"12345678")], {"7F0"}),
+        (lambda answer: [answer[0], *answer], set()),
+        (lambda answer: answer[::-1], set()),
+        (lambda answer: [], {"Estimate", "Decision", "DecisionMargins", "Diagnostics"}),
+    ],
+    ids=["missing", "additional", "twice", "other order", "silence"],
+)
+def test_missing_additional_and_reordered_frames_are_differences(golden_start, change, named):
+    ((agreement,),) = compare_targets([Altered(change)], golden_start)
+    assert agreement.comparison.differing_periods == 1
+    assert agreement.comparison.first.signals
+    assert named <= {frame.message for frame in agreement.frames}
+
+
+def test_equal_answers_are_no_difference(golden_start):
+    ((agreement,),) = compare_targets([Altered(lambda answer: answer)], golden_start)
+    assert agreement.comparison.is_equal
+    assert agreement.frames == ()
+
+
+@pytest.fixture(scope="module")
+def golden_start():
+    return load_scenarios([FOLDER / "charge_start.log.gz"])
+
+
+def test_only_rows_that_no_recording_can_hold_are_left_out():
+    left_out = {row.name.partition(":")[0] for row in ROWS if why_not_played(row)}
+    assert left_out == {"ECU restarts", "clock jitter"}
+
+
+def test_a_target_that_falls_silent_is_an_error_that_names_the_bus(monkeypatch, golden_start):
+    monkeypatch.setattr("hil_sim.targets.remote._ANSWER_TIMEOUT_S", 0.05)
+    with (
+        Line(lambda line: b"") as line,
+        open_bus(line.bus) as bus,
+        pytest.raises(BusError, match=r"no answer in 0\.05 s"),
+    ):
+        replay(golden_start[0].recording, RemoteEcu(bus, 0x180))
+
+
+@needs_vcan
+def test_a_program_that_is_no_ecu_is_an_error_in_one_line(golden_start):
+    with pytest.raises(BusError, match=r"target 'linux': .*/false: does not say") as caught:
+        compare_targets([LinuxTarget("linux", Path("/bin/false"))], golden_start)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--target", "esp32"], "choose one of linux, qemu:mps2-an386, qemu:mps2-an385"),
+        (["--target", "linux", "--build", "/nowhere"], "run 'make firmware TARGET=linux' first"),
+        (["--target", NAMES[1], "--build", "/nowhere"], "'make firmware TARGET=mps2_an386' first"),
+        ([HOT, "--rows", "lost"], "leave one of them out"),
+        (["/nowhere/can.log"], "/nowhere/can.log"),
+    ],
+)
+def test_wrong_use_is_told_in_one_line(bms, tmp_path, arguments, said):
+    if "--build" not in arguments:
+        (tmp_path / "linux").mkdir()
+        (tmp_path / "linux" / "bms_ecu").touch()
+        arguments = [*arguments, "--build", tmp_path]
+    if "--target" not in arguments:
+        arguments = [*arguments, "--target", "linux"]
+    code, out, err = bms("compare-targets", *arguments)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert len(err.splitlines()) == 1
+
+
+def test_a_log_without_sync_is_refused(tmp_path):
+    with gzip.open(HOT, "rt") as lines:
+        real_time = [line for line in lines if " 080#" not in line]
+    (tmp_path / "clock.log").write_text("".join(real_time))
+    with pytest.raises(InputError, match="recorded on the wall clock"):
+        load_scenarios([tmp_path / "clock.log"])
