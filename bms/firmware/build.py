@@ -19,7 +19,7 @@ HEADERS = (
     *("kan", "rcbf", "thermal", "calibration", "can_frame", "e2e", "codec", "monitor", "soc"),
     *("history", "network", "bms"),
 )
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno")
 SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 # What a host needs beyond the firmware: constants by address, and its functions by the thousand.

@@ -26,9 +26,9 @@ CONTROL_MODULES = (
 def measure(build: Path, budget: Budget, cross: str) -> dict[str, Figures]:
     """Figures of the image in a build folder of a microcontroller port, row by row.
 
-    Rows are the modules, the boot stage, control, the core and the image. The stack of a module is the worst
-    from a call of any of its functions, the image's that of the main program when the deepest
-    interrupt comes at the worst moment.
+    Rows are the modules, the boot stage, control, the core and the image. The stack of a module is
+    the worst from a call of any of its functions, the image's that of the main program when the
+    deepest interrupt comes at the worst moment.
     """
     application, boot = read_map(build / "firmware.map"), read_map(build / "boot.map")
     library = library_frames(build / "firmware.elf", cross)

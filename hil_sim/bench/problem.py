@@ -67,7 +67,7 @@ class Problem:
         return np.linspace(0, len(self.lower_A) - 1, count).astype(np.int64)
 
 
-def charge_problem(preset: str, max_time_s: float, seed: int = 0) -> Problem:
+def charge_problem(preset: str, max_time_s: float = 3600.0, seed: int = 0) -> Problem:
     """From a disturbed charge in closed loop with the preset's own model."""
     firmware = Firmware(preset)
     settings = Settings(

@@ -38,16 +38,15 @@ class Section(str, Enum):
 
 @dataclass(frozen=True)
 class Effort:
-    """How long it may take. Times in s are simulated ones."""
+    """How often everything is repeated, and the simulated time of a charge on a bus at most."""
 
     repetitions: int
-    problem_time_s: float
     simulation_repetitions: int
     simulation_time_s: float
 
 
-FULL = Effort(11, 3600.0, 3, 3600.0)
-QUICK = Effort(3, 250.0, 1, 20.0)
+FULL = Effort(11, 3, 3600.0)
+QUICK = Effort(3, 1, 20.0)
 
 
 @dataclass
@@ -83,7 +82,7 @@ def run_benchmark(
     result = Result(this_machine())
     if sections & {Section.ESTIMATE, Section.DECISION, Section.PERIOD}:
         note("the charge that everything is timed on")
-        problem = charge_problem(preset, effort.problem_time_s)
+        problem = charge_problem(preset)
         result.states = len(problem.lower_A)
         with one_core() as result.core:
             if Section.ESTIMATE in sections:
