@@ -24,7 +24,12 @@ help: ## List the targets
 run: .venv/runtime ## Charge a cell at 10C over a CAN bus and write a report to out/run
 	$(BIN)/bms sil --baseline s-cbf --out $(OUT)
 
-test: .venv/tests build/sanitized/done lint ## Everything that must pass, real vcan and sanitizers included
+test: .venv/tests build/sanitized/done lint ## Everything that must pass: real vcan, images in QEMU, sanitizers
+	@if command -v arm-none-eabi-gcc >/dev/null && command -v qemu-system-arm >/dev/null; then \
+	  $(MAKE) --no-print-directory firmware pil; \
+	else \
+	  echo "not run: make firmware and make pil; they need what tools/debian_packages.sh installs" >&2; test -z "$$CI"; \
+	fi
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 	tools/sanitized_tests.sh
 

@@ -107,6 +107,16 @@ static interval_t admitted(const concave_t *f)
     return interval;
 }
 
+static float value_at(const concave_t *f, float u)
+{
+    return f->constant + u * (f->linear + u * f->quadratic);
+}
+
+static float smaller(float a, float b)
+{
+    return (a < b) ? a : b;
+}
+
 static bool is_within(float value, float low, float high)
 {
     return (value >= low) && (value <= high);
@@ -150,14 +160,13 @@ rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t
     if (!decision.feasible) {
         decision.active = RCBF_INFEASIBLE;
     }
-    for (uint32_t i = FUNCTIONS; i > 0u; i--) {
-        const concave_t *f = &functions[i - 1u];
-        const float u = decision.current_A;
-        const float value = f->constant + u * (f->linear + u * f->quadratic);
-        float *margin = &decision.margins[NAME[i - 1u] - RCBF_VOLTAGE];
-        const bool is_first = (i == FUNCTIONS) || (NAME[i] != NAME[i - 1u]);
-        *margin = (is_first || (value < *margin)) ? value : *margin;
-    }
+    const float u = decision.current_A;
+    decision.margins[0] = value_at(&functions[VOLTAGE], u);
+    decision.margins[1] = value_at(&functions[SOC], u);
+    decision.margins[2] = smaller(value_at(&functions[CORE_ABOVE], u),
+                                  value_at(&functions[CORE_BELOW], u));
+    decision.margins[3] = smaller(value_at(&functions[SURFACE_ABOVE], u),
+                                  value_at(&functions[SURFACE_BELOW], u));
     return decision;
 }
 

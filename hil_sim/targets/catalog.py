@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -67,9 +68,15 @@ class QemuTarget:
     board: str
     image: Path
 
-    def start(self, log: Path | None = None) -> Emulation:
-        """A freshly started board, a context manager; InputError when there is no QEMU."""
-        return Emulation(self.image, self.board, log=log)
+    @contextmanager
+    def start(self, image: Path | None = None) -> Iterator[Emulation]:
+        """A freshly started board, with another image than its own if given.
+
+        Raises InputError when there is no QEMU and BusError when the board does not start.
+        """
+        with Emulation(image or self.image, self.board) as board:
+            board.await_line()
+            yield board
 
     def replay(self, recordings: Sequence[Recording]) -> Iterator[list[Answer]]:
         """As Target."""
@@ -77,7 +84,7 @@ class QemuTarget:
             for recording in recordings:
                 last_id = recording.database[LAST_MESSAGE].frame_id
                 image = self._calibrated(recording, Path(folder))
-                with Emulation(image, self.board) as board, open_bus(board.bus) as bus:
+                with self.start(image) as board, open_bus(board.bus) as bus:
                     yield replay(recording, RemoteEcu(bus, last_id))
 
     def _calibrated(self, recording: Recording, folder: Path) -> Path:

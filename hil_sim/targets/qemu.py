@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
-from bms.errors import InputError
+from bms.errors import BusError, InputError
 from bms.image import TARGETS
 
 PROGRAM = "qemu-system-arm"
@@ -64,6 +64,22 @@ class Emulation:
     def bus(self) -> str:
         """Name of the serial line as a CAN bus."""
         return f"slcan:socket://{HOST}:{self.port}"
+
+    def await_line(self, timeout_s: float = 30.0) -> None:
+        """Return when the board says anything on its line, asked for its version.
+
+        What is sent before waits in the line, so that a plant that offers its first period again
+        would be heard twice. Raises BusError when nothing comes.
+        """
+        try:
+            with socket.create_connection((HOST, self.port), timeout_s) as line:
+                line.sendall(b"V\r")
+                if line.recv(1):
+                    return
+            reason = "the emulator has ended"
+        except OSError as error:
+            reason = str(error)
+        raise BusError(f"bus '{self.bus}': the board does not start ({reason}); flash it anew")
 
     @property
     def is_running(self) -> bool:

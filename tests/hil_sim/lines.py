@@ -7,6 +7,8 @@ from collections.abc import Callable
 from threading import Thread
 from types import TracebackType
 
+_PATIENCE_S = 10.0
+
 Answer = Callable[[bytes], bytes]
 
 
@@ -21,7 +23,9 @@ class Line:
         self._thread = Thread(target=self._serve, daemon=True)
 
     def _serve(self) -> None:
+        self._listener.settimeout(_PATIENCE_S)
         connection, _ = self._listener.accept()
+        connection.settimeout(None)
         begun = b""
         with connection:
             while chunk := connection.recv(1 << 16):
@@ -42,8 +46,8 @@ class Line:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
+        self._thread.join(_PATIENCE_S)
         self._listener.close()
-        self._thread.join(5.0)
 
 
 def text(frame_id: int, data: bytes) -> bytes:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
-import time
 from dataclasses import replace
 from pathlib import Path
+from threading import Timer
 
 import pytest
 
@@ -18,6 +20,7 @@ from hil_sim.nodes.line_losses import LOSS_ID
 from hil_sim.recorder import Recorder
 from hil_sim.session import Settings, run_both, run_on_clocks, run_plant, run_sil
 from hil_sim.targets import Emulation
+from hil_sim.targets.catalog import QemuTarget, find_board
 from tests.firmware.ports import ROOT, built, image, needs_emulator
 from tests.hil_sim.ecus import IDENTITY_ID
 from tests.hil_sim.lines import Line, frame, text
@@ -38,7 +41,7 @@ def test_a_full_charge_over_the_serial_line_gives_the_frames_of_the_virtual_bus(
     with Recorder(tmp_path / "host.log") as recorder:
         expected = run_both(settings, recorder).summary
     with (
-        Emulation(built("mps2_an386") / "firmware.bin", BOARD) as board,
+        find_board(f"qemu:{BOARD}", built("mps2_an386").parent).start() as board,
         Recorder(tmp_path / "board.log") as recorder,
     ):
         summary = run_sil(replace(settings, bus=board.bus), recorder).summary
@@ -228,21 +231,30 @@ def test_the_folder_of_an_image_is_the_one_that_make_writes_to():
     assert Path("build/firmware/mps2_an386").resolve() == built("mps2_an386").resolve()
 
 
-def test_what_waits_on_a_line_for_a_slow_ecu_is_not_sent_twice(settings, tmp_path):
-    serial = Serial(settings)
-    slow = iter([0.3])
-
-    def answer(line):
-        said = serial.answer(line)
-        time.sleep(next(slow, 0.0) if said else 0.0)
-        return said
-
+@needs_emulator
+def test_a_board_that_starts_slowly_gets_the_first_period_once(settings, tmp_path):
+    """Paused for longer than the plant waits for an answer before it offers the period again."""
+    quick = replace(settings, max_time_s=0.5)
     with Recorder(tmp_path / "host.log") as recorder:
-        run_both(replace(settings, max_time_s=0.5), recorder)
-    with Line(answer) as line, Recorder(tmp_path / "slow.log") as recorder:
-        quick = replace(settings, bus=line.bus, max_time_s=0.5, answer_timeout_s=0.1)
-        run_plant(quick, recorder)
+        run_both(quick, recorder)
+    with (
+        Emulation(built("mps2_an386") / "firmware.bin", BOARD) as board,
+        Recorder(tmp_path / "slow.log") as recorder,
+    ):
+        process = board._process.pid
+        os.kill(process, signal.SIGSTOP)
+        Timer(1.0, os.kill, (process, signal.SIGCONT)).start()
+        board.await_line()
+        run_plant(replace(quick, bus=board.bus, answer_timeout_s=0.5), recorder)
     assert (tmp_path / "slow.log").read_bytes() == (tmp_path / "host.log").read_bytes()
+
+
+@needs_emulator
+def test_a_board_without_an_image_is_told(tmp_path):
+    (tmp_path / "firmware.bin").write_bytes(b"")
+    target = QemuTarget(f"qemu:{BOARD}", BOARD, tmp_path / "firmware.bin")
+    with pytest.raises(BusError, match="the board does not start"), target.start():
+        pass
 
 
 @pytest.mark.parametrize(

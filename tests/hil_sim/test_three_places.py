@@ -10,7 +10,6 @@ import gzip
 import json
 import os
 import shutil
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -70,12 +69,6 @@ def linux():
     return LinuxTarget("linux", built("linux") / "bms_ecu")
 
 
-def play(work):
-    """Agreements of several targets, each with scenarios of its own, side by side."""
-    with ThreadPoolExecutor(len(work)) as pool:
-        return list(pool.map(lambda one: compare_targets([one[0]], one[1])[0], work))
-
-
 @pytest.fixture(scope="module")
 def charge_and_faults():
     settings = MatrixSettings(*load_pair("paper_calibrated", None), seed=SEED)
@@ -103,7 +96,8 @@ def places(charge_and_faults, golden):
     if HAS_BOARDS:
         work.append((board(HARD_FLOAT), [*faults, *golden.values()]))
         work.append((board(SOFT_FLOAT), [charge, golden["sensor_fault"], *other]))
-    return {by_target[0].target: by_target for by_target in play(work)}
+    # One after the other: there are as many workers of the tests as cores.
+    return {target.name: compare_targets([target], played)[0] for target, played in work}
 
 
 def differing(agreements):
