@@ -1,4 +1,4 @@
-"""What sampling, delay, sensors and the bus subtract from the four constraints.
+"""What sampling, delay, sensors, the bus and float32 subtract from the four constraints.
 
 A command computed from a measurement at time t acts until t + h, h = control period + delay. If
 each left-hand side can fall by no more than its margin within h, and by no more through
@@ -16,6 +16,7 @@ import numpy as np
 
 from bms.barrier.constants import barrier_constants
 from bms.barrier.rates import Weights, largest_rate
+from bms.barrier.rounding import rounding_allowances
 from bms.cell import CellParameters
 from bms.presets.schema import Preset
 
@@ -96,15 +97,19 @@ def sampling_margins(
         )
         + np.abs(constants.a8_per_As2) * coupling
     )
+    core_rounding, surface_rounding = rounding_allowances(cell, preset)
     return Margins(
         voltage_V=_plain(steepest_V * soc_change),
         soc_per_s=_plain(preset.gains.alpha1_per_s * soc_change),
-        core_K_per_s=_plain(held_s * core_fall + constants.a1_per_s * surface_error_K),
+        core_K_per_s=_plain(
+            held_s * core_fall + constants.a1_per_s * surface_error_K + core_rounding
+        ),
         surface_K_per_s2=_plain(
             held_s * surface_fall
             + np.abs(constants.a5_per_s2) * surface_error_K
             + np.abs(constants.a6_per_s2) * coolant_error_K
             + constants.a10_K_per_Ws2 * cooling_error_W
+            + surface_rounding
         ),
     )
 

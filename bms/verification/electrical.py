@@ -10,9 +10,11 @@ import numpy as np
 from bms.barrier import BusQuantisation
 from bms.barrier.margins import soc_error_bound
 from bms.presets import Preset
-from bms.verification.thermal import CURRENT_ERROR_A, Certificate
+from bms.verification.thermal import Certificate
 
 PARTS = 200_000
+CURRENT_ERROR_A = 1e-3
+"""How far the float32 limits by voltage and charge may lie from exact ones (test_rcbf.py)."""
 ROUNDING_V = 1e-9
 """Far above the float64 rounding of the few operations on numbers of some volts."""
 

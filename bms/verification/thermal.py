@@ -19,13 +19,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bms.barrier.rounding import rounding_allowances
 from bms.verification.conditions import Condition, ErrorTerm, ReadingErrors
 from bms.verification.domain import Domain, Point, Rates, weights
 from bms.verification.intervals import Interval
 
 Array = npt.NDArray[np.float64]
-CURRENT_ERROR_A = 1e-3
-"""How far the float32 decision may lie from the exact one (tests/firmware/test_rcbf.py)."""
 LARGEST_BATCH = 20_000
 
 
@@ -114,9 +113,9 @@ def _examine(
         outside |= flow.rate(core_gap, coolant_gap).low > flow.largest
 
     gain = _reading_gain(decided, errors, current)
-    slack = CURRENT_ERROR_A * (
-        abs(decided.coupling) * core.high + 2.0 * abs(decided.squared) * current.magnitude
-    )
+    slack = dict(zip(("core", "surface"), rounding_allowances(domain.cell, domain.preset)))[
+        case.name
+    ]
     admitted = _value(decided, core_gap, coolant_gap, surface, core, current, cooling)
     outside |= admitted.high + gain + slack < 0.0
 

@@ -48,8 +48,8 @@ const bms_calibration_t BMS_DEFAULT_CALIBRATION = {
         .estimation_error_bound_K = 0.421525925f,
         .voltage_margin_V = 0.0148618734f,
         .soc_margin_per_s = 0.000106156243f,
-        .core_margin_K_per_s = 0.00169877533f,
-        .surface_margin_K_per_s2 = 0.0182403624f,
+        .core_margin_K_per_s = 0.00170413114f,
+        .surface_margin_K_per_s2 = 0.0182593577f,
         .ocv_points = 29u,
         .ocv_soc = {
             0.0f, 0.00999999978f, 0.0199999996f, 0.0299999993f,

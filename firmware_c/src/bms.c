@@ -169,7 +169,9 @@ static void update_estimates(bms_t *bms)
                                                   m->coolant_temperature_K };
     bms->estimate = history_estimate(&bms->history, &calibration->kan, measured);
     if (bms->soc_known) {
-        soc_count(&bms->soc, current_A, bms->command_A, calibration->sampling_period_s,
+        /* Out of a charge there is no command to count, but perhaps a load. */
+        const float commanded_A = is_charging(bms) ? bms->command_A : current_A;
+        soc_count(&bms->soc, current_A, commanded_A, calibration->sampling_period_s,
                   calibration->rcbf.capacity_As);
     }
 }

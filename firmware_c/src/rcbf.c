@@ -7,6 +7,7 @@
 /* Beyond these no input is physical, and none inside can make a product overflow. */
 #define COLDEST_K 150.0f
 #define HOTTEST_K 450.0f
+#define LARGEST_LOW_PART_K (HOTTEST_K * FLT_EPSILON)
 #define LOWEST_SOC (-0.1f)
 #define HIGHEST_SOC 1.1f
 #define LARGEST_INPUT 1e4f
@@ -29,7 +30,7 @@ static const interval_t EMPTY = { 1.0f, -1.0f };
  * of which the smaller holds. */
 enum { VOLTAGE, SOC, CORE_ABOVE, CORE_BELOW, SURFACE_ABOVE, SURFACE_BELOW, FUNCTIONS };
 
-/* Exact to the last digit of its terms: numbers that are close to each other subtract exactly. */
+/* Numbers that are close to each other subtract exactly, so that little is lost. */
 static float difference_K(rcbf_temperature_t a, rcbf_temperature_t b)
 {
     return (a.high_K - b.high_K) + (a.low_K - b.low_K);
@@ -122,11 +123,17 @@ static bool is_within(float value, float low, float high)
     return (value >= low) && (value <= high);
 }
 
+/* The low part is what float32 cannot hold of the sum, no more. */
+static bool is_temperature(rcbf_temperature_t temperature)
+{
+    return is_within(temperature.high_K, COLDEST_K, HOTTEST_K) &&
+           is_within(temperature.low_K, -LARGEST_LOW_PART_K, LARGEST_LOW_PART_K);
+}
+
 static bool is_physical(const rcbf_input_t *in)
 {
-    return is_within(in->core_temperature_K.high_K, COLDEST_K, HOTTEST_K) &&
-           is_within(in->surface_temperature_K.high_K, COLDEST_K, HOTTEST_K) &&
-           is_within(in->coolant_temperature_K.high_K, COLDEST_K, HOTTEST_K) &&
+    return is_temperature(in->core_temperature_K) && is_temperature(in->surface_temperature_K) &&
+           is_temperature(in->coolant_temperature_K) &&
            is_within(in->soc, LOWEST_SOC, HIGHEST_SOC) &&
            is_within(in->cooling_power_W, -LARGEST_INPUT, LARGEST_INPUT) &&
            is_within(in->reference_current_A, -LARGEST_INPUT, 0.0f);
@@ -202,17 +209,15 @@ bool rcbf_constants_are_valid(const rcbf_constants_t *k)
                                k->a1_per_s,
                                k->a3_K_per_A2s,
                                -k->a9_K_per_A2s2,
-                               k->a10_K_per_Ws2,
-                               k->max_core_temperature_K.high_K,
-                               k->max_surface_temperature_K.high_K };
+                               k->a10_K_per_Ws2 };
     const float not_negative[] = { k->delta4_K_per_s2,          k->soc_uncertainty_per_s,
                                    k->core_uncertainty_K_per_s, k->estimation_error_bound_K,
                                    k->voltage_margin_V,         k->soc_margin_per_s,
                                    k->core_margin_K_per_s,      k->surface_margin_K_per_s2 };
     bool valid = numeric_is_finite(k->a2_per_As) && numeric_is_finite(k->a8_per_As2) &&
                  numeric_is_finite(k->a4_per_s2) && numeric_is_finite(k->a6_per_s2) &&
-                 numeric_is_finite(k->max_core_temperature_K.low_K) &&
-                 numeric_is_finite(k->max_surface_temperature_K.low_K);
+                 is_temperature(k->max_core_temperature_K) &&
+                 is_temperature(k->max_surface_temperature_K);
     for (uint32_t i = 0u; i < sizeof positive / sizeof positive[0]; i++) {
         valid = valid && (positive[i] > 0.0f) && (positive[i] <= FLT_MAX);
     }

@@ -163,7 +163,7 @@ def test_the_firmwares_own_constants_are_those_that_the_theorem_yields(name):
             "constant": decided.room * decided.limit_K - decided.reserve + margin,
         }
         assert found == pytest.approx(expected, rel=1e-7, abs=1e-12)
-        assert decided.error_bound_K == model.error_bound_K
+        assert decided.error_bound_K == np.float32(model.error_bound_K)
 
 
 @pytest.mark.parametrize("name", preset_names())

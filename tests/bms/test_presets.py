@@ -151,6 +151,8 @@ def test_a_range_that_does_not_rise_is_named(load, key):
         (("operating_box", "current_A"), [-24.0, -0.5], "operating_box.current_A"),
         (("limits", "completion_soc"), 1.01, "limits.completion_soc"),
         (("initial", "soc"), 1.01, "initial.soc"),
+        (("timing", "sampling_period_s"), 0.0015, "sampling_period_s: Input should be a multiple"),
+        (("timing", "sampling_period_s"), 0.1001, "sampling_period_s: Input should be a multiple"),
         (("gains", "alpha3_per_s2"), 0.0901, "gains"),
         (("gains", "alpha4_per_s"), 0.44, "gains"),
     ],

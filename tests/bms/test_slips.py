@@ -16,7 +16,6 @@ from bms.verification.slips import with_slips
 BY_NAME: dict[str, Slip] = {slip.name: slip for slip in (*SLIPS, CLASHING_DELTA4)}
 UNSAFE = [
     ("lin2014", "core-sign"),
-    ("lin2014", "core-error-sign"),
     ("lin2014", "surface-error"),
     ("lin2014", "no-margins"),
     ("lin2014", "delta4-sign"),

@@ -140,6 +140,21 @@ def test_charge_is_counted_from_the_stronger_of_reading_and_command(bias_A: floa
     assert counted == pytest.approx(200 * 0.1 * stronger_A / 8280, abs=4e-5)
 
 
+def test_a_load_after_the_charge_is_counted_too() -> None:
+    """What the cell gives off is believed, so that the voltage goes on to fit the count."""
+    bench = Bench()
+    bench.start_at_full_current(PlugInStateOfCharge=0.3)
+    bench.period(Request=0)
+    bench.period()
+    bench.follow_command = False
+    before = bench.answer["StateOfCharge"]
+    cell = bench.ecu.preset.cell
+    for _ in range(3000):
+        voltage_V = cell.ocv(bench.answer["StateOfCharge"]) - 0.4 * cell.ohmic_resistance_ohm
+        bench.period(Current=0.4, Voltage=float(voltage_V))
+    assert bench.answer["StateOfCharge"] - before == pytest.approx(-3000 * 0.04 / 8280, abs=4e-5)
+
+
 def test_every_message_of_the_database_is_received_or_sent() -> None:
     ecu = Bench().ecu
     sent = set()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
@@ -11,8 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import sparse
-from scipy.optimize import minimize
+from scipy.optimize import brentq, minimize
 
+from bms.barrier.rounding import rounding_allowances
 from bms.decision import Decision
 from bms.firmware import Firmware
 from tests.firmware.constraints import NAMES, interval, quadratics, value
@@ -142,6 +144,52 @@ def test_decision_names_the_constraint_that_decides_and_reports_all_margins(
         else:
             assert margins[NAMES.index(decision.active_constraint)] == pytest.approx(0, abs=1e-5)
     assert {"none", "soc", "core", "infeasible"} <= seen
+
+
+def tight_states(firmware: Firmware, name: str, count: int) -> Iterator[dict[str, float]]:
+    """States in which a constraint leaves a few ampere or none at all, where its slope is least."""
+    random = np.random.default_rng(5)
+    group = NAMES.index(name)
+    for _ in range(count):
+        current_A = random.uniform(-3.0, 0.3)
+        core_above_K, coolant_below_K = random.uniform(0, 8), random.uniform(-2, 35)
+        cooling_W = random.uniform(0, 1)
+
+        def state(surface_K: float) -> dict[str, float]:
+            return {
+                "soc": 0.3,
+                "core_temperature_K": surface_K + core_above_K,  # noqa: B023
+                "surface_temperature_K": surface_K,
+                "coolant_temperature_K": surface_K - coolant_below_K,  # noqa: B023
+                "cooling_power_W": float(np.float32(cooling_W)),  # noqa: B023
+                "reference_current_A": -23.0,
+            }
+
+        def left_K(surface_K: float) -> float:
+            sides = quadratics(firmware.parameters, state(surface_K))[group]
+            return min(value(q, current_A) for q in sides)  # noqa: B023
+
+        low_K, high_K = 285.0, 324.0
+        if left_K(low_K) > 0.0 > left_K(high_K):
+            yield state(brentq(left_K, low_K, high_K, xtol=1e-9))
+
+
+@pytest.mark.parametrize("name", ["core", "surface"])
+def test_float32_never_takes_more_than_its_allowance(firmware: Firmware, name: str) -> None:
+    allowances = dict(
+        zip(("core", "surface"), rounding_allowances(firmware.preset.cell, firmware.preset))
+    )
+    decided = 0
+    for state in tight_states(firmware, name, 1_500):
+        decision = solve(firmware, state)
+        if decision.current_A == 0.0:
+            continue
+        decided += decision.active_constraint == name
+        groups = quadratics(firmware.parameters, state)
+        for other, allowance in allowances.items():
+            sides = groups[NAMES.index(other)]
+            assert min(value(q, decision.current_A) for q in sides) >= -allowance, state
+    assert decided > 50
 
 
 BAD = st.sampled_from([math.nan, math.inf, -math.inf, 1e30, -1e30])
