@@ -122,11 +122,16 @@ def require_shared(name: str) -> None:
 
 def is_line(name: str) -> bool:
     """Whether the bus is a line with one end here, so that an ECU can only be at the other one."""
-    return name.startswith("slcan:")
+    return name.startswith(f"slcan:{SCHEME}")
 
 
 def require_room_for_ecu(name: str) -> None:
-    """Raise InputError for a line, which plant and ECU cannot share one end of."""
+    """Raise InputError for a line or an adapter, which plant and ECU cannot share."""
+    if name.startswith("slcan:") and not is_line(name):
+        raise InputError(
+            f"bus '{name}': one adapter is one party; use 'bms plant', and 'bms ecu' or the ECU at "
+            "another adapter, or a bus such as virtual:bms"
+        )
     if is_line(name):
         raise InputError(
             f"bus '{name}': has one end here, and the ECU is at the other; use 'bms sil' or "
@@ -148,10 +153,7 @@ def _remedy(interface: str) -> str:
             "which provides socketcan:vcan0"
         )
     if interface == "slcan":
-        return (
-            "see that an image or adapter listens there (an adapter needs 'pip install pyserial'), "
-            "or use virtual:bms"
-        )
+        return "see that an image or adapter listens there, or use virtual:bms"
     if interface not in can.VALID_INTERFACES:
         return "choose an interface that python-can knows, for example virtual:bms"
     return "check that the adapter is there and its driver installed, or use virtual:bms"

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Annotated
 
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Gt, Le, MultipleOf
 
 from bms.cell import CellParameters
 from bms.errors import InputError
@@ -77,9 +77,12 @@ class Uncertainty:
 @strict
 @dataclass(frozen=True)
 class Timing:
-    """Control period, and the longest time from a measurement to the current it leads to."""
+    """Control period, and the longest time from a measurement to the current it leads to.
 
-    sampling_period_s: Annotated[float, Ge(0.001), Le(10.0)]
+    The period is a whole number of milliseconds, by which the firmware's ports step.
+    """
+
+    sampling_period_s: Annotated[float, Ge(0.001), Le(10.0), MultipleOf(0.001)]
     delay_s: Annotated[float, Ge(0.0), Le(10.0)]
 
 

@@ -24,16 +24,19 @@ def library_frames(elf: Path, cross: str) -> dict[str, int]:
     starts = sorted(set(symbols.values()))
     nexts = dict(pairwise(starts))
     bodies: dict[int, list[tuple[str, str]]] = {start: [] for start in starts}
+
+    def function_at(address: int) -> int:
+        return starts[max(bisect_right(starts, address) - 1, 0)]
+
     for address, instruction in _instructions(elf, cross).items():
-        if (place := bisect_right(starts, address)) > 0:
-            bodies[starts[place - 1]].append(instruction)
+        bodies[function_at(address)].append(instruction)
 
     def worst(start: int, chain: frozenset[int]) -> int:
         body = bodies.get(start, [])
         if start in chain or not body:
             return 0
         targets = [_BRANCH_TARGET.match(operands) for name, operands in body if name[0] == "b"]
-        onward = {int(target[1], 16) for target in targets if target}
+        onward = {function_at(int(target[1], 16)) for target in targets if target} - {start}
         if start in nexts and not _ends(*body[-1]):
             onward.add(nexts[start])  # runs into the next one
         deeper = (worst(callee, chain | {start}) for callee in onward)

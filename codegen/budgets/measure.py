@@ -28,16 +28,17 @@ def measure(build: Path, budget: Budget, cross: str) -> dict[str, Figures]:
 
     Rows are the modules, the boot stage, control, the core and the image. The stack of a module is
     the worst from a call of any of its functions, the image's that of the main program when the
-    deepest interrupt comes at the worst moment.
+    deepest interrupt comes at the worst moment, the boot stage's that of its own, which has none.
     """
     application, boot = read_map(build / "firmware.map"), read_map(build / "boot.map")
     library = library_frames(build / "firmware.elf", cross)
-    files = [
-        path
-        for path in sorted((build / "application").rglob("*.ci"))
-        if _module(path) in application.flash
-    ]
+    files = _linked_files(build / "application", application)
     graph = read_call_graph(files, library, budget.indirect_calls)
+    boot_graph = read_call_graph(
+        _linked_files(build / "boot", boot),
+        library_frames(build / "boot.elf", cross),
+        budget.indirect_calls,
+    )
     # What the linker left out may call what it left out too.
     linked = {path: [f for f in _functions(path) if f.split(":")[-1] in library] for path in files}
     stacks = {
@@ -50,7 +51,7 @@ def measure(build: Path, budget: Budget, cross: str) -> dict[str, Figures]:
         for module in sorted(application.flash)
     }
     core_modules = [m for m in rows if m == LIBRARY or m.split("/")[0] in ("src", "generated")]
-    rows[BOOT] = Figures(flash=_total(boot, boot.flash))
+    rows[BOOT] = Figures(_total(boot, boot.flash), sum(boot.ram.values()), boot_graph.worst(START))
     rows[CONTROL] = Figures(flash=_total(application, CONTROL_MODULES))
     rows[CORE] = Figures(
         _total(application, core_modules),
@@ -63,6 +64,10 @@ def measure(build: Path, budget: Budget, cross: str) -> dict[str, Figures]:
         graph.worst(START) + budget.exception_frame + _stack(graph, HANDLERS),
     )
     return rows
+
+
+def _linked_files(folder: Path, sizes: Sizes) -> list[Path]:
+    return [path for path in sorted(folder.rglob("*.ci")) if _module(path) in sizes.flash]
 
 
 def _total(sizes: Sizes, modules: Iterable[str]) -> int:

@@ -73,7 +73,8 @@ static void run_period(cost_t *cost)
     }
 }
 
-/* What the last period has estimated and decided on. */
+/* What the last period has estimated and decided on, but with the reference as it was asked for:
+ * without the bounds that bms_step puts on it and on its growth. */
 static void take_state(cost_t *cost)
 {
     const bms_t *bms = &cost->bms;

@@ -2,7 +2,8 @@
  *
  * From the host: S, s, Z (settings, accepted), O or L (open), C (close), t (frame), F (status
  * flags), V, N (version, serial number). T, r and R are frames that this ECU has no use for. Frames
- * in either direction pass only while the channel is open, and are not acknowledged.
+ * in either direction pass only while the channel is open, and are not acknowledged. A board that
+ * restarts has forgotten an open channel, as an adapter does; only the boot stage speaks unasked.
  */
 #ifndef SLCAN_H
 #define SLCAN_H

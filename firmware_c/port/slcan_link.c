@@ -120,6 +120,9 @@ bool slcan_link_receive(slcan_link_t *link, can_frame_t *frame)
         }
         answer(link, event);
     }
+    if (link->slcan.is_open) {
+        report_losses(link); /* an application that sends nothing would never tell */
+    }
     return false;
 }
 

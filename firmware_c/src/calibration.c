@@ -2,6 +2,9 @@
 
 #include "numeric.h"
 
+#define SHORTEST_PERIOD_S 0.001f
+#define LONGEST_PERIOD_S 10.0f
+
 static bool range_is_valid(const range_t *range)
 {
     return numeric_is_finite(range->low) && numeric_is_finite(range->high) &&
@@ -24,10 +27,16 @@ static bool plausibility_is_valid(const plausibility_t *limits)
            is_positive(limits->surface_deficit_K);
 }
 
+/* Ports step by a clock of whole milliseconds. */
+static bool period_is_valid(float sampling_period_s)
+{
+    return (sampling_period_s >= SHORTEST_PERIOD_S) && (sampling_period_s <= LONGEST_PERIOD_S);
+}
+
 bool calibration_is_valid(const bms_calibration_t *calibration)
 {
     return (calibration->layout == BMS_CALIBRATION_LAYOUT) &&
-           is_positive(calibration->sampling_period_s) &&
+           period_is_valid(calibration->sampling_period_s) &&
            is_positive(-calibration->reference_current_A) &&
            is_positive(calibration->current_growth_A) &&
            is_positive(calibration->completion_soc) &&

@@ -82,6 +82,8 @@ static bool is_near(float value, float clamped)
     return (beyond <= KAN_FACE_TOLERANCE) && (beyond >= -KAN_FACE_TOLERANCE);
 }
 
+typedef char kan_horner_has_all_coefficients[(KAN_CELL_COEFFICIENTS == 8) ? 1 : -1];
+
 static inline float edge_value(const float *knots, const float *coefficients, uint32_t cells,
                                float x, bool *in_domain)
 {

@@ -11,7 +11,7 @@ from hil_sim.bench.run import Result
 
 @dataclass(frozen=True)
 class Aim:
-    """One of them; `unit` is ns, or what a ratio is to."""
+    """One of them; `unit` is "ns" for a time and "times" for a ratio."""
 
     name: str
     measured: float

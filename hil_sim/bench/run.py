@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
+from importlib import import_module
 
 from hil_sim.bench.decision import (
     decision_from_python,
@@ -108,14 +109,13 @@ def run_benchmark(
 def _estimate(result: Result, problem: Problem, repetitions: int, clock_ns: ClockNs) -> None:
     peers: list[Peer | Absent] = [estimate_in_c(problem), estimate_from_python(problem)]
     peers += scipy_estimates(problem)
-    try:
-        # PyTorch takes seconds to import, and is optional.
+    if _is_installed("torch", "kan"):
         from hil_sim.bench.torch_estimate import pykan_estimates, torch_perceptron  # noqa: PLC0415
 
         perceptron = torch_perceptron(problem)
         result.perceptron = race(perceptron.reference, perceptron.peers, repetitions, clock_ns)
         peers += pykan_estimates(problem)
-    except ImportError:
+    else:
         peers.append(
             Absent(
                 "KAN in pykan, and MLP in PyTorch", "not installed; pip install pykan==0.2.8 torch"
@@ -126,23 +126,32 @@ def _estimate(result: Result, problem: Problem, repetitions: int, clock_ns: Cloc
 
 def _decision(result: Result, problem: Problem, repetitions: int, clock_ns: ClockNs) -> None:
     peers: list[Peer | Absent] = [decision_in_c(problem), decision_from_python(problem)]
-    try:
+    if _is_installed("osqp"):
         peers += osqp_decisions(problem)
-    except ImportError:
+    else:
         peers.append(Absent("OSQP", "not installed; pip install osqp"))
     peers.append(slsqp_decision(problem))
     with _generated(problem) as peer:
         result.decision = race(problem.lower_A, [*peers, peer], repetitions, clock_ns)
 
 
+def _is_installed(*modules: str) -> bool:
+    """Whether optional packages import; some take seconds."""
+    try:
+        for module in modules:
+            import_module(module)
+    except ImportError:
+        return False
+    return True
+
+
 @contextmanager
 def _generated(problem: Problem) -> Iterator[Peer | Absent]:
     with ExitStack() as stack:
-        peer: Peer | Absent
+        peer: Peer | Absent = Absent(GENERATED, "not installed; pip install cvxpygen")
         try:
-            peer = stack.enter_context(generated_solver(problem))
-        except ImportError:
-            peer = Absent(GENERATED, "not installed; pip install cvxpygen")
+            if _is_installed("cvxpy", "cvxpygen"):
+                peer = stack.enter_context(generated_solver(problem))
         except (OSError, subprocess.CalledProcessError) as error:
             peer = Absent(GENERATED, f"its code does not compile here ({error})")
         yield peer

@@ -19,9 +19,9 @@ from hil_sim.bench.layers import sampled
 from hil_sim.bench.race import Clocks, Spread
 from hil_sim.recorder import Recorder
 from hil_sim.session import Settings, run_both, run_plant
+from hil_sim.targets.linux import GUEST
 
 BUSES = ("virtual:bench", "udp_multicast:239.74.163.71", "socketcan:vcan0")
-GUEST = Path(__file__).resolve().parents[2] / "tools" / "vcan_guest.sh"
 _GUEST_TIMEOUT_S = 900
 _ANSWER_TIMEOUT_S = 2.0
 """Long enough for an ECU that is still starting, ten times in a row."""
@@ -72,9 +72,9 @@ def bus_speed(
     """Charges for max_time_s, recorded to can.log; one more, not timed, shows the layers.
 
     Plant and ECU share a process on a virtual bus and are two processes on any other; the layers
-    are those of the plant's process. A bus that does not exist here is named with the reason, but
-    a SocketCAN one is looked for in the guest first. What passes before the first answer of the ECU
-    does not count.
+    are those of the plant's process. A bus that does not exist here or on which a charge fails is
+    named with the reason, but a SocketCAN one is looked for in the guest first. What passes before
+    the first answer of the ECU does not count.
     """
     interface, _, channel = bus.partition(":")
     if interface == "socketcan" and not Path("/sys/class/net", channel).exists():
@@ -100,12 +100,15 @@ def bus_speed(
 
 
 def _charge(settings: Settings, preset: str, is_virtual: bool, pace: _Pace) -> None:
+    """Charge; BusError when that fails, as a speed of something else would mean nothing."""
     with TemporaryDirectory() as folder, Recorder(Path(folder) / "can.log") as recorder:
         if is_virtual:
-            run_both(settings, recorder, pace.tick)
+            summary = run_both(settings, recorder, pace.tick).summary
         else:
             with _ecu_process(settings.bus, preset):
-                run_plant(settings, recorder, pace.tick)
+                summary = run_plant(settings, recorder, pace.tick).summary
+    if summary.failures:
+        raise BusError(f"charge failed: {'; '.join(summary.failures)}")
 
 
 @contextmanager

@@ -38,13 +38,11 @@ def print_tables(console: Console, result: Result) -> None:
             if section != "perceptron":
                 c_ns = rows[0].time_ns.median if isinstance(rows[0], Timed) else None
             console.print(_ways(title, rows, c_ns))
-    if result.simulation:
+    for speed in result.simulation:
+        if speed.not_run:
+            console.print(f"not run: {speed.bus}: {speed.not_run}", soft_wrap=True, markup=False)
+    if any(speed.times_real_time for speed in result.simulation):
         console.print(_simulation(result))
-        for speed in result.simulation:
-            if speed.not_run:
-                console.print(
-                    f"not run: {speed.bus}: {speed.not_run}", soft_wrap=True, markup=False
-                )
         console.print(_layers(result))
     if result.campaign:
         console.print(_campaign(result))

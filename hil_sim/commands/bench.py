@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.errors import InputError
 from hil_sim.bench.outcome import outcome_json
 from hil_sim.bench.race import Clocks, WrongAnswerError
 from hil_sim.bench.run import FULL, QUICK, Section, run_benchmark
@@ -64,6 +65,10 @@ def bench(
 
     Example: bms bench --section estimate --section decision --json
     """
+    buses = bus or list(QUICK_BUSES if quick else BUSES)
+    for name in buses:
+        if not all(name.partition(":")):
+            raise InputError(f"--bus '{name}': not interface:channel; write for example {BUSES[0]}")
     shown = Console(stderr=True, quiet=json or not sys.stderr.isatty())
     try:
         # A slow spinner, because it shares the processor with what is timed.
@@ -72,7 +77,7 @@ def bench(
                 set(section or Section),
                 preset,
                 QUICK if quick else FULL,
-                bus or list(QUICK_BUSES if quick else BUSES),
+                buses,
                 campaign_runs or list(QUICK_CAMPAIGN_RUNS if quick else CAMPAIGN_RUNS),
                 jobs,
                 Clocks(time.perf_counter_ns, time.process_time_ns),

@@ -80,6 +80,9 @@ def compare(
     matrix = [] if logs else chosen_rows(load_matrix(), rows)
     left_out = {row.name: reason for row in matrix if (reason := why_not_played(row)) is not None}
     playable = [row for row in matrix if row.name not in left_out]
+    recorded = load_scenarios(logs) if logs else None
+    for place in targets:
+        place.require_place()
     columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(
         *columns,
@@ -89,7 +92,7 @@ def compare(
     ) as bar:
         count = len(logs) if logs else 1 + len(playable)
         task = bar.add_task("runs", total=count * (len(targets) + (not logs)))
-        scenarios = load_scenarios(logs) if logs else _recorded(seed, playable, bar, task)
+        scenarios = recorded or _recorded(seed, playable, bar, task)
         agreements = compare_targets(targets, scenarios, lambda: bar.advance(task))
     if json:
         print(json_format.dumps(_json(scenarios, agreements, left_out), indent=2))

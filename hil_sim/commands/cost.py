@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import json
+import json as json_format
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -10,20 +11,23 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from bms.errors import InputError
+from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.presets import DEFAULT_PRESET, load_preset
+from hil_sim.commands import options
 from hil_sim.cost import CostReport, measure_cost
-from hil_sim.cost.chart import write_chart
-
-WITHIN, BEYOND = 0, 1
-_PREFIX = "qemu:"
-_BUILDS = Path("build/firmware")
+from hil_sim.cost.chart import cost_chart
+from hil_sim.report.folder import OutputFolder
+from hil_sim.targets.catalog import BOARD_NAMES, BUILD, board_name
 
 
 def cost(
     target: Annotated[
-        list[str], typer.Option("--target", help="Board, as qemu:NAME; any number of times.")
-    ] = ["qemu:mps2-an386", "qemu:mps2-an385"],  # noqa: B006
+        list[str] | None,
+        typer.Option(
+            "--target",
+            help=f"Board: {' or '.join(BOARD_NAMES)}. May be repeated. Default: both of them.",
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of noise and search.")] = 0,
     charges: Annotated[
         int, typer.Option("--charges", min=1, help="Random beginnings of charges in the search.")
@@ -38,9 +42,10 @@ def cost(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="PNG with the instructions over the charge.")
+        Path | None,
+        typer.Option("--out", dir_okay=False, help="PNG with the instructions over the charge."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    json: options.JsonOption = False,
 ) -> int:
     """Count instructions of estimate, decision and control period over a charge and a search.
 
@@ -51,30 +56,28 @@ def cost(
     Example: bms cost --target qemu:mps2-an386 --limit 1500 --out cost.png
     """
     preset = load_preset(DEFAULT_PRESET)
-    boards = [_board(name) for name in target]
-    reports = [
-        measure_cost(
-            _BUILDS / board.replace("-", "_") / "cost.elf", board, preset, seed, charges, states
-        )
-        for board in boards
-    ]
-    if out is not None:
-        write_chart(reports, preset.timing.sampling_period_s, out)
-    if as_json:
-        typer.echo(json.dumps([report.to_json() for report in reports], indent=1))
+    boards = [board_name(name) for name in target or BOARD_NAMES]
+    with OutputFolder(out.parent) if out is not None else nullcontext() as folder:
+        reports = [
+            measure_cost(_program(board), board, preset, seed, charges, states) for board in boards
+        ]
+        if folder is not None and out is not None:
+            picture = cost_chart(reports, preset.timing.sampling_period_s)
+            folder.path(out.name).write_bytes(picture)
+            folder.commit()
+    if json:
+        typer.echo(json_format.dumps([report.to_json() for report in reports], indent=1))
     else:
         _print(reports, charges, states)
     worst = max(report.costs["estimate_and_decision"].worst for report in reports)
     if limit is not None and worst > limit:
         typer.echo(f"estimate and decision: {worst} instructions, allowed {limit}", err=True)
-        return BEYOND
-    return WITHIN
+        return EXIT_CHECK_FAILED
+    return EXIT_DONE
 
 
-def _board(target: str) -> str:
-    if not target.startswith(_PREFIX):
-        raise InputError(f"target '{target}': write {_PREFIX}BOARD, e.g. {_PREFIX}mps2-an386")
-    return target[len(_PREFIX) :]
+def _program(board: str) -> Path:
+    return BUILD / board.replace("-", "_") / "cost.elf"
 
 
 def _print(reports: list[CostReport], charges: int, states: int) -> None:

@@ -11,17 +11,17 @@ from typing import Annotated
 import typer
 
 from bms.errors import InputError
-from bms.image import TARGETS
+from hil_sim.commands import options
 from hil_sim.targets import Emulation, Flash
+from hil_sim.targets.catalog import BOARD_NAMES, board_name
 
-_EMULATOR = "qemu:"
 _POLL_S = 0.1
 
 
 def flash(
     target: Annotated[
-        str, typer.Option("--target", help="Board: qemu:mps2-an386 or qemu:mps2-an385.")
-    ] = "qemu:mps2-an386",
+        str, typer.Option("--target", help=f"Board: {' or '.join(BOARD_NAMES)}.")
+    ] = BOARD_NAMES[0],
     image: Annotated[
         Path | None,
         typer.Option("--image", help="Binary image of 'make firmware'. Default: what is in flash."),
@@ -48,7 +48,7 @@ def flash(
     start: Annotated[
         bool, typer.Option("--start/--no-start", help="Start the board until Ctrl-C or SIGTERM.")
     ] = True,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object only.")] = False,
+    json: options.JsonOption = False,
 ) -> int:
     """Program the emulated flash of a board, then run the board until Ctrl-C or SIGTERM.
 
@@ -57,10 +57,7 @@ def flash(
 
     Example: bms flash --image build/firmware/mps2_an386/firmware.bin --port 5000
     """
-    board = target.removeprefix(_EMULATOR)
-    if board not in TARGETS or board == target:
-        known = ", ".join(_EMULATOR + name for name in TARGETS)
-        raise InputError(f"target '{target}': unknown; choose one of {known}")
+    board = board_name(target)
     memory = Flash(flash_file or Path("build/flash") / f"{board}.bin", board)
     if image is not None or calibration is not None:
         memory.program(image, calibration)

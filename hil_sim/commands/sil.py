@@ -51,8 +51,8 @@ def sil(
 ) -> int:
     """Charge a simulated cell over a CAN bus with the ECU in the same process.
 
-    On a bus slcan:... the ECU is the one at the other end of that line, such as an image in QEMU or
-    on a board: nothing of it runs here, and it has to name the given preset and model.
+    On a bus slcan:socket://... the ECU is the one at the other end of that line, such as an image
+    in QEMU: nothing of it runs here, and it has to name the given preset and model.
     Temperatures in K, currents in A (negative while charging), times in s from the start of the
     charge. The S-CBF baselines know the true state of the cell, as their method assumes; all others
     see the bus only. Exit code 1 when the controller lets a limit be crossed or the charge fails.

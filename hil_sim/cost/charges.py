@@ -6,8 +6,10 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from bms.presets import Preset
 from hil_sim.bus import Frame
@@ -16,6 +18,7 @@ from hil_sim.disturbances import DisturbanceKind
 from hil_sim.logs import read_log
 from hil_sim.nodes.ecu import SYNC_ID
 from hil_sim.recorder import Recorder
+from hil_sim.result import CHARGING_STATES
 from hil_sim.session import Settings, run_both
 
 SHORT_CHARGE_S = 8.0
@@ -23,13 +26,22 @@ SHORT_CHARGE_S = 8.0
 _COLDEST_ABOVE_BOX_K, _HOTTEST_BELOW_LIMIT_K = 1.0, 5.0
 
 
-def charge_records(settings: Settings) -> list[bytes]:
-    """A charge from the ECU's start, in what the ECU receives. Raises InputError or BusError."""
+class ChargeRecords(NamedTuple):
+    """A charge from the ECU's start, in what the ECU receives."""
+
+    records: list[bytes]
+    decides: npt.NDArray[np.bool_]
+    """(N,) by period, whether the ECU decides on the current in it."""
+
+
+def charge_records(settings: Settings) -> ChargeRecords:
+    """Run a charge. Raises InputError or BusError."""
     with tempfile.TemporaryDirectory() as name:
         log = Path(name) / "charge.log"
         with Recorder(log) as recorder:
-            run_both(settings, recorder)
-        return [restart(), *_periods(log)]
+            states = run_both(settings, recorder).series.state
+        decides = np.array([state in CHARGING_STATES for state in states])
+        return ChargeRecords([restart(), *_periods(log)], decides)
 
 
 def random_charges(preset: Preset, count: int, rng: np.random.Generator) -> Iterator[bytes]:
@@ -48,7 +60,7 @@ def random_charges(preset: Preset, count: int, rng: np.random.Generator) -> Iter
             disturbance=DisturbanceKind.BANG_BANG,
             max_time_s=SHORT_CHARGE_S,
         )
-        yield from charge_records(settings)
+        yield from charge_records(settings).records
 
 
 def _periods(log: Path) -> Iterator[bytes]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from bms.errors import InputError
 from hil_sim.cost.measure import CostReport
+from hil_sim.report.chart import png
 
 _PANELS = (
     {"control_period": ("whole control period", "C0")},
@@ -24,35 +23,21 @@ _HEADROOM = 1.35
 """Of the highest line, so that the legend has a place of its own."""
 
 
-def write_chart(reports: Sequence[CostReport], period_s: float, path: Path) -> None:
-    """Write a row of panels for each board as PNG; InputError when the file cannot be written."""
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt  # noqa: PLC0415
-
-    figure, panels = plt.subplots(
-        len(reports),
-        len(_PANELS),
-        figsize=(10.0, 3.4 * len(reports)),
-        layout="constrained",
-        squeeze=False,
-        sharex=True,
-    )
+def cost_chart(reports: Sequence[CostReport], period_s: float) -> bytes:
+    """PNG with a row of panels for each board, instructions over time."""
+    figure = Figure(figsize=(10.0, 3.4 * len(reports)), layout="constrained")
+    panels = figure.subplots(len(reports), len(_PANELS), squeeze=False, sharex=True)
     for report, row in zip(reports, panels):
         for axes, lines in zip(row, _PANELS):
             _draw(axes, report, lines, period_s)
         row[0].set_ylabel("instructions")
     for axes in panels[-1]:
         axes.set_xlabel("time since the ECU's first decision (s)")
-    try:
-        figure.savefig(path, dpi=130, metadata={"Software": None})
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from None
-    finally:
-        plt.close(figure)
+    return png(figure)
 
 
 def _draw(
-    axes: Any, report: CostReport, lines: dict[str, tuple[str, str]], period_s: float
+    axes: Axes, report: CostReport, lines: dict[str, tuple[str, str]], period_s: float
 ) -> None:
     for kind, (label, color) in lines.items():
         counts, worst = report.series[kind][report.charging], report.costs[kind].worst

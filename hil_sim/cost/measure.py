@@ -40,8 +40,8 @@ class CostReport:
     board: str
     costs: dict[str, Cost]
     series: dict[str, Instructions]
-    charging: slice
-    """The periods of the charge itself, which the figures of a charge are taken from."""
+    charging: npt.NDArray[np.bool_]
+    """(N,) the periods with a decision, which the figures of a charge are taken from."""
 
     def to_json(self) -> dict[str, Any]:
         """Figures by kind of work."""
@@ -61,11 +61,11 @@ def measure_cost(
     Raises InputError.
     """
     rng = np.random.default_rng(seed)
-    whole = count(program, board, charge_records(Settings(preset, seed=seed)))
+    records, charging = charge_records(Settings(preset, seed=seed))
+    whole = count(program, board, records)
     random = count(program, board, list(random_charges(preset, charges, rng)))
     searched = search_states(preset, states, rng, lambda records: count(program, board, records))
     both = whole.estimate + whole.decision
-    charging = _charging(whole.decision)
     series = {
         "estimate": whole.estimate,
         "decision": whole.decision,
@@ -83,11 +83,6 @@ def measure_cost(
     }
     costs = {kind: _cost(series[kind][charging], found[kind]) for kind in series}
     return CostReport(board, costs, series, charging)
-
-
-def _charging(decision: Instructions) -> slice:
-    """From the first decision that was not refused for want of measurements."""
-    return slice(int(np.argmax(decision > 0.5 * np.median(decision))), None)
 
 
 def _cost(charge: Instructions, found: tuple[Instructions, ...]) -> Cost:

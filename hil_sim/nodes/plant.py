@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bms.errors import BusError
-from hil_sim.bus import CanBus, Frame, ecu_remedy
+from hil_sim.bus import CanBus, Frame, ecu_remedy, is_line
 from hil_sim.database import MessageCodec, Values
 from hil_sim.e2e import Receiver, Sender
 from hil_sim.nodes.turns import Turn
@@ -113,17 +113,21 @@ class PlantNode:
         """Publish what is measured and wanted in a period, and return what the ECU answers.
 
         Until an ECU has answered for the first time, a period of a lock step is offered again
-        with the same frames, so that the ECU may start later than the plant. Raises BusError
-        when none comes.
+        with the same frames, so that the ECU may start later than the plant. A line keeps what
+        an ECU has not read yet, which would then hear the period twice: there the plant only goes
+        on listening. Raises BusError when none comes.
         """
         frames = self._sent(self._frames(readings, request))
         late = self._late_frames(period) if self._is_answer_late else []
         self._turn.begin()
-        for _ in range(CONNECT_ATTEMPTS):
-            sent_s = self._turn.time_s(period)
-            for frame in frames:
-                self._bus.send(frame)
-            heard = [
+        heard: list[tuple[float, Frame]] = []
+        for attempt in range(CONNECT_ATTEMPTS):
+            if attempt == 0 or not is_line(self._bus.name):
+                heard.clear()
+                sent_s = self._turn.time_s(period)
+                for frame in frames:
+                    self._bus.send(frame)
+            heard += [
                 (self._turn.time_s(period), frame)
                 for frame in self._turn.answers(self._bus, period, self._is_last)
             ]

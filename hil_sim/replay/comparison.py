@@ -65,10 +65,12 @@ def compare(
     """Compare two lists of answers to a recording; frames with an ignored identifier do not count.
 
     Frames are equal when all their bytes are. What no value of a signal explains is listed as
-    'counter or CRC of' or 'number of' a message, or as 'order of messages'.
+    'counter or CRC of' or 'number of' a message, or as 'order of messages'. Raises ValueError when
+    a list is not as long as the recording.
     """
     result = Comparison(len(recording.periods))
-    for number, (period, *answers) in enumerate(zip(recording.periods, one, other)):
+    rows = zip(recording.periods, one, other, strict=True)
+    for number, (period, *answers) in enumerate(rows):
         left, right = (_without(answer, ignored_ids) for answer in answers)
         if left != right:
             _note(result, number, period, signals, left, right)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
+from bms.errors import BusError
 from hil_sim.bus import Frame
 from hil_sim.replay.comparison import Comparison, compare
 from hil_sim.replay.recording import Answer
@@ -58,8 +59,19 @@ def _on_target(
     agreements = []
     answers = target.replay([scenario.recording for scenario in scenarios])
     for scenario, said in zip(scenarios, answers):
+        count = len(scenario.recording.periods)
+        if len(said) != count:
+            raise BusError(
+                f"target '{target.name}': answered {len(said)} of {count} periods of "
+                f"{scenario.name}; build it anew"
+            )
         agreements.append(_agreement(target.name, scenario, said))
         played()
+    if len(agreements) != len(scenarios):
+        raise BusError(
+            f"target '{target.name}': played {len(agreements)} of {len(scenarios)} runs; "
+            "build it anew"
+        )
     return agreements
 
 

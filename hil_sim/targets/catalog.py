@@ -18,14 +18,15 @@ from hil_sim.bus import open_bus
 from hil_sim.replay.engine import replay
 from hil_sim.replay.identity import choose_pair
 from hil_sim.replay.recording import LAST_MESSAGE, Answer, Recording
-from hil_sim.targets.linux import replay_on_linux
-from hil_sim.targets.qemu import Emulation
+from hil_sim.targets.linux import replay_on_linux, require_interface
+from hil_sim.targets.qemu import Emulation, require_emulator
 from hil_sim.targets.remote import RemoteEcu
 
 BUILD = Path("build") / "firmware"
 QEMU = "qemu:"
 LINUX = "linux"
-NAMES = (LINUX, *(f"{QEMU}{board}" for board in sorted(BOARDS, reverse=True)))
+BOARD_NAMES = tuple(f"{QEMU}{board}" for board in sorted(BOARDS, reverse=True))
+NAMES = (LINUX, *BOARD_NAMES)
 
 
 class Target(Protocol):
@@ -34,6 +35,10 @@ class Target(Protocol):
     @property
     def name(self) -> str:
         """One of NAMES."""
+        ...
+
+    def require_place(self) -> None:
+        """Raise InputError where this machine lacks what the target runs on."""
         ...
 
     def replay(self, recordings: Sequence[Recording]) -> Iterable[list[Answer]]:
@@ -51,6 +56,10 @@ class LinuxTarget:
     name: str
     program: Path
 
+    def require_place(self) -> None:
+        """As Target."""
+        require_interface()
+
     def replay(self, recordings: Sequence[Recording]) -> list[list[Answer]]:
         """As Target."""
         return replay_on_linux(self.program, recordings)
@@ -67,6 +76,10 @@ class QemuTarget:
     name: str
     board: str
     image: Path
+
+    def require_place(self) -> None:
+        """As Target."""
+        require_emulator()
 
     @contextmanager
     def start(self, image: Path | None = None) -> Iterator[Emulation]:
@@ -117,6 +130,13 @@ def find_board(name: str, build: Path = BUILD) -> QemuTarget:
     if isinstance(target, QemuTarget):
         return target
     raise InputError(f"target '{name}': not a board; start it, then 'bms plant' on its bus")
+
+
+def board_name(target: str) -> str:
+    """The board of a target, mps2-an386 of qemu:mps2-an386; InputError when it is none."""
+    if target not in BOARD_NAMES:
+        raise InputError(f"target '{target}': unknown; choose one of {', '.join(BOARD_NAMES)}")
+    return target.removeprefix(QEMU)
 
 
 def _built(path: Path, port: str) -> Path:

@@ -58,7 +58,12 @@ class Flash:
         return _read(self.path)
 
     def _write(self, image: bytes) -> None:
-        self.path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"{self.path}: cannot be written ({error.strerror}); choose a folder that can"
+            ) from None
         write_bytes(self.path, image)
 
 

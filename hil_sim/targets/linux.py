@@ -17,6 +17,21 @@ ROOT = Path(__file__).parents[2]
 GUEST = ROOT / "tools" / "vcan_guest.sh"
 WORKER = Path(__file__).with_name("socketcan_worker.py")
 INTERFACE = "vcan0"
+KERNEL = "/usr/bin/linux.uml"
+"""Of the guest, as in tools/vcan_guest.sh."""
+
+
+def require_interface() -> None:
+    """Raise InputError where there is neither vcan0 nor what its guest needs."""
+    if Path("/sys/class/net", INTERFACE).exists():
+        return
+    if not GUEST.is_file():
+        raise InputError(f"{GUEST}: no such file; run the command in a checkout of the project")
+    if not Path(KERNEL).exists():
+        raise InputError(
+            f"{INTERFACE}: no such interface, and no guest that has one; run "
+            "'apt-get install -y --no-install-recommends user-mode-linux'"
+        )
 
 
 def replay_on_linux(program: Path, recordings: Sequence[Recording]) -> list[list[Answer]]:
@@ -24,8 +39,7 @@ def replay_on_linux(program: Path, recordings: Sequence[Recording]) -> list[list
 
     Raises InputError without vcan0 and guest, BusError when the ECU does not end well.
     """
-    if not GUEST.is_file():
-        raise InputError(f"{GUEST}: no such file; run the command in a checkout of the project")
+    require_interface()
     frames = [
         [[(frame.frame_id, frame.data.hex()) for frame in period.received] for period in r.periods]
         for r in recordings

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
+from typing import IO
 
 from bms.errors import BusError, InputError
 from bms.image import TARGETS
@@ -17,6 +18,14 @@ from bms.image import TARGETS
 PROGRAM = "qemu-system-arm"
 HOST = "127.0.0.1"
 _STOP_TIMEOUT_S = 5.0
+
+
+def require_emulator() -> str:
+    """Path of QEMU; InputError where there is none."""
+    program = shutil.which(PROGRAM)
+    if program is None:
+        raise InputError(f"{PROGRAM}: not installed; run 'apt-get install qemu-system-arm'")
+    return program
 
 
 class Emulation:
@@ -37,20 +46,18 @@ class Emulation:
         """Start a board with a binary or ELF image; `port` 0 is any that is free.
 
         What QEMU says goes to `log`, `options` to QEMU. Raises InputError for an unknown target,
-        a missing QEMU or a port that is in use.
+        a missing QEMU, a port that is in use or a log that cannot be written.
         """
         if target not in TARGETS:
             raise InputError(f"target '{target}': unknown; choose one of {', '.join(TARGETS)}")
-        program = shutil.which(PROGRAM)
-        if program is None:
-            raise InputError(f"{PROGRAM}: not installed; run 'apt-get install qemu-system-arm'")
+        program = require_emulator()
         with _listening(port) as line:
             self.port: int = line.getsockname()[1]
             chardev = f"socket,id=line,fd={line.fileno()},server=on,wait=off"
             arguments = [program, "-machine", target, "-kernel", str(image)]
             arguments += ["-display", "none", "-monitor", "none", "-nodefaults"]
             arguments += ["-chardev", chardev, "-serial", "chardev:line", *options]
-            self._log = subprocess.DEVNULL if log is None else log.open("wb")
+            self._log = subprocess.DEVNULL if log is None else _opened(log)
             with _on_one_core(self.port // 2):  # the system gives out odd ports only
                 self._process = subprocess.Popen(
                     arguments,
@@ -68,8 +75,8 @@ class Emulation:
     def await_line(self, timeout_s: float = 30.0) -> None:
         """Return when the board says anything on its line, asked for its version.
 
-        What is sent before waits in the line, so that a plant that offers its first period again
-        would be heard twice. Raises BusError when nothing comes.
+        A board whose image does not start is found here, before anybody waits for its answers.
+        Raises BusError when nothing comes.
         """
         try:
             with socket.create_connection((HOST, self.port), timeout_s) as line:
@@ -86,9 +93,12 @@ class Emulation:
         """Whether the board has not ended by itself."""
         return self._process.poll() is None
 
-    def wait(self) -> int:
-        """Wait until the board ends by itself; its exit code."""
-        return self._process.wait()
+    def wait(self, timeout_s: float) -> int | None:
+        """Wait until the board ends by itself; its exit code, None when it goes on running."""
+        try:
+            return self._process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            return None
 
     def stop(self) -> None:
         """Switch the board off."""
@@ -129,6 +139,15 @@ def _on_one_core(number: int) -> Iterator[None]:
         yield
     finally:
         os.sched_setaffinity(0, cores)
+
+
+def _opened(log: Path) -> IO[bytes]:
+    try:
+        return log.open("wb")
+    except OSError as error:
+        raise InputError(
+            f"{log}: cannot be written ({error.strerror}); choose a folder that can"
+        ) from None
 
 
 def _listening(port: int) -> socket.socket:

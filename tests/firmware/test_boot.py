@@ -177,6 +177,31 @@ def test_no_charge_begins_with_a_damaged_calibration(bms: Any, tmp_path: Path) -
     assert "boot stage refuses the calibration" in error
 
 
+def mutant(tree: Path, *changes: tuple[str, str]) -> bytes:
+    """Image with a boot stage in which texts are replaced."""
+    image()
+    for folder in ("firmware_c", "build/firmware/mps2_an386"):
+        shutil.copytree(ROOT / folder, tree / folder)
+    source = tree / "firmware_c" / "port" / "cortex_m" / "boot.c"
+    text = source.read_text()
+    for old, new in changes:
+        assert old in text, "the change no longer applies; bring it up to date"
+        text = text.replace(old, new)
+    source.write_text(text)
+    return (build("mps2_an386", tree) / "firmware.bin").read_bytes()
+
+
+def answers_sync(path: Path) -> bool:
+    """Whether the application has started: it says its version when a period begins."""
+    with Emulation(path, BOARD) as board, open_bus(board.bus) as bus:
+        bus.send(Frame(CODECS["SYNC"].frame_id, b""))
+        while (frame := bus.receive(ANSWER_TIMEOUT_S)) is not None:
+            if frame.frame_id == CODECS["Identity"].frame_id:
+                version = CODECS["Identity"].decode(frame.data)["FirmwareVersion"]
+                return version == lib.BMS_FIRMWARE_VERSION
+    return False
+
+
 @pytest.mark.parametrize(
     ("call", "name"),
     [
@@ -185,19 +210,23 @@ def test_no_charge_begins_with_a_damaged_calibration(bms: Any, tmp_path: Path) -
         ("image_check_calibration", "calibration damaged"),
     ],
 )
-def test_a_boot_stage_that_does_not_check_is_noticed(call: str, name: str, tmp_path: Path) -> None:
-    tree = tmp_path / "tree"
-    image()
-    for folder in ("firmware_c", "build/firmware/mps2_an386"):
-        shutil.copytree(ROOT / folder, tree / folder)
-    source = tree / "firmware_c" / "port" / "cortex_m" / "boot.c"
-    text, old = source.read_text(), f"status = {call}("
-    assert old in text, "the change no longer applies; bring it up to date"
-    source.write_text(text.replace(old, f"status = IMAGE_OK; (void){call}("))
-    mutant = (build("mps2_an386", tree) / "firmware.bin").read_bytes()
-    damaged = damaged_images(mutant)[name]
-    frames = [frame for _, frame in heard(put(damaged.image, tmp_path), 1, SILENCE_S)]
-    assert refusal(frames) != (damaged.part, damaged.status)
+def test_without_a_check_what_is_damaged_would_start(call: str, name: str, tmp_path: Path) -> None:
+    unchecked = f"status = {call}(", f"status = IMAGE_OK; (void){call}("
+    careless = mutant(tmp_path / "tree", unchecked)
+    assert not answers_sync(put(damaged_images(image())[name].image, tmp_path))
+    assert answers_sync(put(damaged_images(careless)[name].image, tmp_path))
+
+
+def test_a_refusal_that_ends_starts_nothing(tmp_path: Path) -> None:
+    """The board restarts and refuses again, as the frame counters that stand still show."""
+    once = [
+        ("__attribute__((noreturn)) ", ""),
+        ("period = 0u;; period++", "period = 0u; period < 1u; period++"),
+    ]
+    damaged = damaged_images(mutant(tmp_path / "tree", *once))["calibration damaged"]
+    frames = [frame for _, frame in heard(put(damaged.image, tmp_path), periods=3)]
+    assert frames == 3 * frames[: len(SPOKEN)]
+    says_no_current_and_why(frames[: len(SPOKEN)], damaged.part, damaged.status)
 
 
 @pytest.mark.parametrize("fault", ["undefined instruction", "stack overflow"])

@@ -26,6 +26,10 @@ from tests.firmware.ports import BOARDS, CROSS, ROOT, build, built, needs_compil
 FIRMWARE = ROOT / "firmware_c"
 FILES = ("budgets.toml", "figures.json")
 RAM_START, STACK_BYTES = 0x2000_0000, 2048
+LIMITS = [
+    *("control_flash", "core_flash", "core_ram", "core_stack", "boot_flash", "boot_stack"),
+    *("image_flash", "image_ram", "stack"),
+]
 PROCESSOR = ["-mcpu=cortex-m3", "-mthumb"]
 
 
@@ -150,6 +154,8 @@ def test_frames_of_the_library_are_read_from_its_instructions(tmp_path: Path) ->
         ".type middle, %function\nmiddle: str lr, [sp, #-8]!\n bl leaf\n ldr pc, [sp], #8\n"
         ".type falls, %function\nfalls: stmdb sp!, {r4-r7}\n movs r0, r0\n"
         ".type into, %function\ninto: vpush {d8-d9}\n bx lr\n"
+        ".type inside, %function\ninside: push {r4, lr}\n cbz r0, 1f\n b leaf + 4\n"
+        "1: pop {r4, pc}\n"
     )
     output(
         f"{CROSS}as",
@@ -171,13 +177,11 @@ def test_frames_of_the_library_are_read_from_its_instructions(tmp_path: Path) ->
     frames = library_frames(tmp_path / "part.elf", CROSS)
     assert (frames["leaf"], frames["middle"]) == (40, 48)
     assert (frames["falls"], frames["into"]) == (32, 16)
+    assert frames["inside"] == 8 + frames["leaf"], "a branch into the middle counts as a call"
 
 
 @needs_compiler
-@pytest.mark.parametrize(
-    "limit",
-    ["control_flash", "core_flash", "core_ram", "core_stack", "image_flash", "stack"],
-)
+@pytest.mark.parametrize("limit", LIMITS)
 def test_each_limit_fails_when_it_is_exceeded(limit: str, tmp_path: Path) -> None:
     for name in FILES:
         shutil.copy(FIRMWARE / name, tmp_path)
@@ -193,6 +197,19 @@ def test_each_limit_fails_when_it_is_exceeded(limit: str, tmp_path: Path) -> Non
         done.stderr
         == f"budgets: mps2_an386 {limit}: {used} bytes, 1 more than the {used - 1} allowed\n"
     )
+
+
+@pytest.mark.parametrize("target", BOARDS)
+def test_every_board_has_all_limits(target: str) -> None:
+    assert list(load_budget(FIRMWARE / "budgets.toml", target).limits) == LIMITS
+
+
+@needs_compiler
+def test_the_boot_stage_needs_the_stack_of_its_own_deepest_chain() -> None:
+    """At least main, the frames it refuses with, and their text; no state outside the stack."""
+    rows = figures("mps2_an386")
+    assert 3 * 16 < rows["boot"].stack < rows["image"].stack
+    assert rows["boot"].ram == 0
 
 
 @needs_compiler
@@ -242,7 +259,7 @@ def test_figures_of_every_board_are_accepted(target: str) -> None:
 
 @needs_emulator
 @pytest.mark.parametrize("target", BOARDS)
-def test_the_stack_that_a_charge_really_uses_is_within_the_bound(
+def test_the_stack_that_the_beginning_of_a_charge_uses_is_within_the_bound(
     target: str, tmp_path: Path
 ) -> None:
     """RAM is zero when the board starts; what is no longer zero has been used."""

@@ -10,7 +10,7 @@ import pytest
 from bms.firmware import Ecu
 from bms.firmware.build import HEADERS
 from bms.presets import DEFAULT_PRESET
-from tests.firmware.bench import HEALTHY, MEASURED, frame
+from tests.firmware.bench import DATABASE, HEALTHY, MEASURED, STATES, frame
 from tests.firmware.native_library import FIRMWARE, load_library
 
 NATIVE = Path(__file__).parent / "native"
@@ -24,6 +24,9 @@ LOOP_HEADERS = [*(f"include/{name}.h" for name in HEADERS), "port/port.h", "port
 SYNC = (0x080, b"")
 COMMAND_ID = 0x180
 PERIOD_MS, SILENCE_MS = 100, 5000
+IN_LOCK_STEP_MS = 3
+REQUEST_PERIODS = 10
+OHMIC_RESISTANCE_OHM = 0.0125
 Frame = tuple[int, bytes]
 
 
@@ -43,14 +46,37 @@ class Port:
             "idle": ffi.callback("void(uint32_t)", self._idle),
         }
         self._functions = ffi.new("scripted_port_t *", self._callbacks)
-        lib.scripted_port_set(self._functions)
+        self.bind()
         self._loop = ffi.new("ecu_loop_t *")
         lib.ecu_loop_init(self._loop, ffi.addressof(lib, "BMS_DEFAULT_CALIBRATION"))
+
+    def bind(self) -> None:
+        """Make this the board that the C sources know; there is one at a time."""
+        self._lib.scripted_port_set(self._functions)
 
     def run_until(self, time_ms: int) -> None:
         while self.now_ms < time_ms:
             self._end_ms = time_ms
             self._lib.ecu_loop_turn(self._loop)
+
+    def command(self) -> dict[str, Any]:
+        """The last charge command; no current before the first one."""
+        data = [data for _, (frame_id, data) in self.sent if frame_id == COMMAND_ID]
+        if not data:
+            return {"CommandCurrent": 0.0}
+        return DATABASE.get_message_by_frame_id(COMMAND_ID).decode(data[-1], decode_choices=False)
+
+    def charge(self, first: int, last: int, *after: Frame, period_ms: float = PERIOD_MS) -> None:
+        """Periods of a cell that follows the commands; frames `after` the measurements of each."""
+        start_ms = self.now_ms
+        for period in range(first, last):
+            current_A = float(self.command()["CommandCurrent"])
+            values = HEALTHY | {"Request": float(period > REQUEST_PERIODS), "Current": current_A}
+            values |= {"ReferenceCurrent": -5.0}
+            values |= {"Voltage": HEALTHY["Voltage"] - OHMIC_RESISTANCE_OHM * current_A}
+            frames = (*(frame(name, period, values) for name in MEASURED), *after)
+            self.waiting += [(self.now_ms, f) for f in frames]
+            self.run_until(start_ms + round((period + 1 - first) * period_ms))
 
     def step_times_ms(self) -> list[int]:
         return [time_ms for time_ms, (frame_id, _) in self.sent if frame_id == COMMAND_ID]
@@ -126,26 +152,79 @@ def test_sync_takes_over_from_the_clock(port: Port) -> None:
     assert port.step_times_ms() == [start_ms + 50, start_ms + 150, start_ms + 170, start_ms + 900]
 
 
-def test_when_sync_falls_silent_the_clock_steps_on_and_commands_no_current(port: Port) -> None:
-    start_ms = port.now_ms
-    port.waiting = [(start_ms, SYNC)]
-    port.run_until(start_ms + SILENCE_MS + 950)
-    silent = [start_ms + SILENCE_MS + PERIOD_MS * n for n in range(10)]
-    assert port.step_times_ms() == [start_ms, *silent]
-    ecu = Ecu(DEFAULT_PRESET)
-    ecu.step()
-    no_current = dict(ecu.transmit())[COMMAND_ID][2:]
-    assert port.sent[-1][1][1][2:] == no_current
+def test_a_charge_by_the_clock_ignores_a_foreign_sync(library: tuple[Any, Any]) -> None:
+    alone, disturbed = Port(*library), Port(*library)
+    for port, foreign in ((alone, ()), (disturbed, (SYNC,))):
+        port.bind()
+        port.charge(0, 20)
+        for period in range(20, 60, 2):
+            port.charge(period, period + 1, *foreign)
+            port.charge(period + 1, period + 2)
+    assert alone.command()["CommandCurrent"] < 0.0
+    assert disturbed.sent == alone.sent
 
 
-def test_after_a_stall_missed_periods_are_not_caught_up(port: Port) -> None:
+def test_when_sync_falls_silent_in_a_charge_the_clock_steps_on_and_ends_the_current(
+    port: Port,
+) -> None:
+    port.charge(0, 60, SYNC, period_ms=IN_LOCK_STEP_MS)
+    assert len(port.step_times_ms()) == 60, "a charge in lock step follows SYNC"
+    assert port.command()["CommandCurrent"] < 0.0
+    last_ms = port.step_times_ms()[-1]
+    port.run_until(last_ms + SILENCE_MS + 950)
+    silent = [last_ms + SILENCE_MS + PERIOD_MS * n for n in range(10)]
+    assert port.step_times_ms()[60:] == silent
+    assert port.command()["CommandCurrent"] == 0.0
+    port.waiting = [(port.now_ms + 7, SYNC)]
+    port.run_until(port.now_ms + 20)
+    assert port.step_times_ms()[-1] == last_ms + SILENCE_MS + 957, "in lock step again"
+
+
+@pytest.mark.parametrize("stall_ms", [55, 120, 1000, 1049])
+def test_after_a_stall_missed_periods_are_not_caught_up_and_the_phase_stays(
+    port: Port, stall_ms: int
+) -> None:
     start_ms = port.now_ms
     port.waiting = [(start_ms, measurements(0)[0])]
     port.run_until(start_ms + 100)
-    port.now_ms += 1000
-    port.run_until(start_ms + 1350)
-    late_ms = start_ms + 1100
-    assert port.step_times_ms() == [start_ms + 50, late_ms, late_ms, late_ms + 100, late_ms + 200]
+    port.now_ms += stall_ms
+    port.run_until(start_ms + 1400)
+    late_ms = 100 + stall_ms
+    in_phase = [ms for ms in range(150, 1400, PERIOD_MS) if ms > late_ms]
+    assert port.step_times_ms() == [start_ms + ms for ms in (50, late_ms, *in_phase)]
+
+
+@pytest.mark.parametrize("period_ms", [99.8, 100.2])
+def test_steps_stay_between_the_measurements_of_a_clock_that_runs_apart(
+    port: Port, period_ms: float
+) -> None:
+    """A foreign frame set the phase; over the minute both clocks part by more than a period."""
+    start_ms = port.now_ms
+    port.waiting = [(start_ms, (0x7F0, b"foreign"))]
+    port.run_until(start_ms + 48)
+    measured_from_ms = port.now_ms
+    port.charge(0, 600, period_ms=period_ms)
+    after_ms = [
+        (step_ms - measured_from_ms) % period_ms
+        for step_ms in port.step_times_ms()
+        if step_ms > measured_from_ms + 2 * PERIOD_MS
+    ]
+    assert len(after_ms) == pytest.approx(600, abs=5)
+    assert all(40.0 <= late_ms <= 60.0 for late_ms in after_ms)
+    assert STATES[int(port.command()["CommandState"])] == "Charging"
+
+
+@pytest.mark.parametrize(
+    ("period_s", "valid"),
+    [(0.001, True), (10.0, True), (0.00099, False), (10.001, False), (1e30, False), (-0.1, False)],
+)
+def test_a_calibration_has_a_period_that_the_clock_can_keep(
+    library: tuple[Any, Any], period_s: float, valid: bool
+) -> None:
+    ffi, lib = library
+    block = ffi.new("bms_calibration_t *", lib.BMS_DEFAULT_CALIBRATION)
+    block.sampling_period_s = period_s
+    assert lib.calibration_is_valid(block) == valid
 
 
 def test_frames_without_end_do_not_stop_the_clock(port: Port) -> None:

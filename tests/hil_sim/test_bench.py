@@ -4,6 +4,9 @@ import json
 import statistics
 import subprocess
 import sys
+import time
+from functools import partial
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -11,10 +14,13 @@ import pytest
 from bms.cell import CellState, integrate_step
 from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.bench import simulation
+from hil_sim.bench.generated_solver import GENERATED
 from hil_sim.bench.layers import sampled
 from hil_sim.bench.problem import charge_problem
 from hil_sim.bench.race import Absent, Clocks, Peer, Spread, WrongAnswerError, race
 from hil_sim.bench.simulation import bus_speed
+from hil_sim.faults import load_faults
+from hil_sim.session import Settings
 from tests.firmware.constraints import interval, quadratics
 
 RIGHT = np.array([1.0, 2.0, 3.0, 4.0])
@@ -113,6 +119,31 @@ def test_every_way_to_the_same_answer_is_compared_timed_and_named(bms):
     assert result["simulation"] == result["campaign"] == []
 
 
+@pytest.mark.parametrize(
+    ("modules", "section", "key", "name"),
+    [
+        (("osqp",), "decision", "decision", "OSQP, warm update and solve"),
+        (("cvxpy", "cvxpygen"), "decision", "decision", GENERATED),
+        (("torch", "kan"), "estimate", "estimate", "KAN in pykan"),
+        (("torch", "kan"), "estimate", "perceptron", "PyTorch"),
+    ],
+)
+def test_exactly_what_is_installed_is_timed(bms, modules, section, key, name):
+    is_installed = all(find_spec(module) for module in modules)
+    _, out, _ = bms("bench", "--quick", "--json", "--section", section)
+    rows = [row for row in json.loads(out)[key] if name in row["name"]]
+    assert rows or not is_installed
+    assert all(("median_time_ns" in row) == is_installed for row in rows)
+
+
+@pytest.mark.parametrize("module", ["hil_sim.bench.torch_estimate", "bms.rivals.perceptron"])
+def test_a_module_of_our_own_that_does_not_import_is_no_missing_package(bms, monkeypatch, module):
+    monkeypatch.delitem(sys.modules, "hil_sim.bench.torch_estimate", raising=False)
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(ImportError, match=module):
+        bms("bench", "--quick", "--section", "estimate")
+
+
 def test_answers_that_differ_end_in_exit_code_1_with_the_names(bms, monkeypatch):
     monkeypatch.setattr("hil_sim.bench.decision.SOLVER_TOLERANCE_A", 0.0)
     code, out, err = bms("bench", "--quick", "--section", "decision")
@@ -144,6 +175,21 @@ def test_simulation_tells_its_speed_and_what_it_spends_time_on(bms):
     assert "choose an interface that python-can knows" in nonsense["not_run"]
 
 
+def test_a_bus_that_was_not_run_is_named_without_an_empty_table(bms):
+    code, out, _ = bms("bench", "--quick", "--section", "simulation", "--bus", "nonsense:1")
+    assert code == 0
+    assert "not run: nonsense:1: " in out
+    assert "x real time" not in out
+    assert "spends that time on" not in out
+
+
+@pytest.mark.parametrize("name", ["vcan0", ":vcan0", "socketcan:"])
+def test_a_malformed_bus_is_refused_before_anything_is_timed(bms, name):
+    code, out, err = bms("bench", "--quick", "--bus", "virtual:bench-test", "--bus", name)
+    assert (code, out) == (2, "")
+    assert err == f"bms: --bus '{name}': not interface:channel; write for example virtual:bench\n"
+
+
 def test_speed_leaves_out_the_time_before_the_first_answer():
     wall = iter([10_000_000_000, *range(11_000_000_000, 99_000_000_000, 10_000_000)])
     cpu = iter([3_000_000_000, 3_000_000_000 + 285_000_000, 0, 0])
@@ -153,6 +199,17 @@ def test_speed_leaves_out_the_time_before_the_first_answer():
     measured_s = 1.0 + (periods - 2) * 0.01
     assert speed.times_real_time.median == pytest.approx((periods - 1) * 0.1 / measured_s)
     assert speed.processor_share_percent == pytest.approx(28.5 / measured_s)
+
+
+def test_a_charge_that_fails_has_no_speed(monkeypatch, tmp_path):
+    path = tmp_path / "faults.toml"
+    path.write_text('[[fault]]\nkind = "message-lost"\nmessage = "CellThermal"\nfrom_s = 1\n')
+    faulty = partial(Settings, faults=load_faults(path))
+    monkeypatch.setattr(simulation, "Settings", faulty)
+    clocks = Clocks(time.perf_counter_ns, time.process_time_ns)
+    speed = bus_speed("virtual:bench-failure", DEFAULT_PRESET, 100.0, 1, clocks)
+    assert speed.times_real_time is None
+    assert speed.not_run.startswith("charge failed: ")
 
 
 def test_a_layer_is_charged_with_what_happens_below_it():

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bms.errors import BusError, InputError
-from hil_sim.bus import Frame, open_bus, require_shared
+from hil_sim.bus import Frame, ecu_remedy, is_line, open_bus, require_room_for_ecu, require_shared
 
 
 @pytest.fixture
@@ -62,6 +62,16 @@ def test_a_bus_that_cannot_be_opened_is_one_line_with_a_remedy(name, said):
         open_bus(name)
     assert "\n" not in str(caught.value)
     assert name in str(caught.value)
+
+
+def test_an_adapter_is_on_a_bus_with_others_and_a_socket_is_a_line_with_two_ends():
+    assert is_line("slcan:socket://127.0.0.1:5000")
+    assert not is_line("slcan:/dev/ttyACM0")
+    assert ecu_remedy("slcan:/dev/ttyACM0") == "start 'bms ecu --bus slcan:/dev/ttyACM0'"
+    for name in ("slcan:/dev/ttyACM0", "slcan:socket://127.0.0.1:5000"):
+        with pytest.raises(InputError, match=r"use .*'bms plant'"):
+            require_room_for_ecu(name)
+    require_room_for_ecu("socketcan:vcan0")
 
 
 def test_a_virtual_bus_is_no_bus_for_two_processes():

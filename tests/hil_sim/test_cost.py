@@ -9,11 +9,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from bms.errors import InputError
 from bms.presets import load_preset
 from hil_sim.cost.counting import count
-from hil_sim.cost.measure import measure_cost
+from hil_sim.cost.measure import CostReport, measure_cost
 from hil_sim.cost.records import State, counts, period, restart, state
 
 ROOT = Path(__file__).parents[2]
@@ -59,6 +61,11 @@ def test_a_thousand_instructions_count_as_a_thousand(tmp_path):
     assert counted.decision[0] > 100
 
 
+def test_a_program_that_does_not_end_is_told(program):
+    with pytest.raises(InputError, match=r"cost\.elf: has not ended on mps2-an386 in 0\.01 s"):
+        count(program, FPU, [state(WARM)] * 1000, timeout_s=0.01)
+
+
 def test_counts_are_repeatable_and_belong_to_their_record(program):
     cold = WARM._replace(surface_temperature_K=280.0, core_temperature_K=500.0)
     alone = [count(program, FPU, [state(one)]) for one in (WARM, cold)]
@@ -71,15 +78,29 @@ def test_counts_are_repeatable_and_belong_to_their_record(program):
     assert together.period.tolist() == [0, 0, 0]
 
 
-def test_estimate_and_decision_stay_within_the_budget_everywhere_the_search_goes(program):
-    report = measure_cost(program, FPU, load_preset("paper_calibrated"), 1, 10, 1000)
+@pytest.fixture(scope="module")
+def report(program) -> CostReport:
+    return measure_cost(program, FPU, load_preset("paper_calibrated"), 1, 10, 1000)
+
+
+def test_estimate_and_decision_stay_within_the_budget_everywhere_the_search_goes(report):
     both, whole = report.costs["estimate_and_decision"], report.costs["control_period"]
     assert both.worst <= BUDGET
     assert both.charge_minimum <= both.charge_median <= both.charge_worst <= both.worst
     assert both.worst <= report.costs["estimate"].worst + report.costs["decision"].worst
     assert whole.charge_minimum > both.charge_worst
-    periods = load_preset("paper_calibrated").timing.sampling_period_s
-    assert len(report.series["control_period"][report.charging]) * periods > 700.0
+    period_s = load_preset("paper_calibrated").timing.sampling_period_s
+    assert np.count_nonzero(report.charging) * period_s > 700.0
+
+
+def test_figures_of_a_charge_are_those_of_its_first_decision_to_its_last(report):
+    whole, decided = report.series["control_period"], np.flatnonzero(report.charging)
+    assert 0 < decided[0] < decided[-1] < len(whole) - 1
+    assert np.all(np.diff(decided) == 1)
+    # A period without a decision costs less, whatever else it holds.
+    assert whole[~report.charging].max() < report.costs["control_period"].charge_minimum
+    both = report.series["estimate_and_decision"]
+    assert np.all(whole[decided] > both[decided])
 
 
 def test_the_command_prints_every_figure_and_fails_beyond_its_limit(
@@ -101,14 +122,19 @@ def test_the_command_prints_every_figure_and_fails_beyond_its_limit(
 
 def test_wrong_use_is_one_line(bms, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
     for arguments, words in (
-        (("--target", "mps2-an386"), "write qemu:BOARD"),
+        (("--target", "mps2-an386"), "choose one of qemu:mps2-an386, qemu:mps2-an385"),
+        (("--target", "qemu:virt"), "choose one of qemu:mps2-an386, qemu:mps2-an385"),
         (("--target", f"qemu:{FPU}"), "run 'make cost'"),
+        (("--out", "file/cost.png"), "file: cannot be written"),
+        (("--out", "."), "is a directory"),
     ):
         status, _, errors = bms("cost", *arguments)
         assert status == 2
         assert words in errors
         assert errors.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_records_hold_exactly_the_frames_of_a_period():

@@ -155,8 +155,9 @@ def test_a_damaged_calibration_in_flash_can_be_replaced(flash, lin2014):
         (["--image", "mps2_an386/firmware.elf"], "ELF file"),
         (["--image", "mps2_an386/firmware.hex"], "Intel HEX file"),
         (["--image", "mps2_an385/firmware.bin"], "another board"),
-        (["--target", "mps2-an386"], "choose one of qemu:mps2-an385, qemu:mps2-an386"),
+        (["--target", "mps2-an386"], "choose one of qemu:mps2-an386, qemu:mps2-an385"),
         (["--target", "qemu:virt"], "choose one of"),
+        (["--image", "mps2_an386/firmware.bin", "--flash", "/proc/x/f.bin"], "cannot be written"),
     ],
 )
 def test_wrong_use_is_told_in_one_line(bms, tmp_path, monkeypatch, arguments, words):
@@ -172,6 +173,13 @@ def test_a_port_in_use_is_told(flash):
         port = taken.getsockname()[1]
         with pytest.raises(InputError, match=f"port {port}: .*choose another"):
             Emulation(flash.path, BOARD, port)
+
+
+def test_a_log_that_cannot_be_written_is_told_in_one_line(bms, flash, tmp_path):
+    log = tmp_path / "nowhere" / "qemu.log"
+    code, _, error = bms("flash", "--flash", flash.path, "--log", log)
+    assert code == 2
+    assert error.startswith(f"bms: {log}: cannot be written") and len(error.splitlines()) == 1
 
 
 def test_the_command_runs_the_board_until_it_is_told_to_end(flash):

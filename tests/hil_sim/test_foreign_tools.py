@@ -38,7 +38,8 @@ bms() {
 export -f bms
 ecu_listens() { grep -q ' raw$' /proc/net/can/rcvlist_fil; }
 candump_listens() { grep -q ' raw$' /proc/net/can/rcvlist_all; }
-await() { until [ "$(grep -c "$1" charge.log)" -ge "$2" ]; do sleep 0.3; done; }
+plant_ended() { ! kill -0 $plant 2> /dev/null; }
+await() { until [ "$(grep -c "$1" charge.log)" -ge "$2" ] || plant_ended; do sleep 0.3; done; }
 
 . ./record
 . ./charge
@@ -47,7 +48,7 @@ mkfifo keys
 script -qfc "stty cols COLUMNS rows ROWS; bms monitor --bus socketcan:vcan0" screen < keys > out &
 exec 3> keys
 await ' 080#' 250
-until grep -q paper_calibrated screen; do sleep 0.3; done
+until grep -q paper_calibrated screen || plant_ended; do sleep 0.3; done
 . ./foreign_traffic
 await ' 300#' 500
 await ' [0-9A-F]\{8\}#' 500

@@ -244,7 +244,6 @@ def test_a_board_that_starts_slowly_gets_the_first_period_once(settings, tmp_pat
         process = board._process.pid
         os.kill(process, signal.SIGSTOP)
         Timer(1.0, os.kill, (process, signal.SIGCONT)).start()
-        board.await_line()
         run_plant(replace(quick, bus=board.bus, answer_timeout_s=0.5), recorder)
     assert (tmp_path / "slow.log").read_bytes() == (tmp_path / "host.log").read_bytes()
 

@@ -259,6 +259,15 @@ def test_every_byte_of_an_answer_counts(change, said):
     assert said in comparison.first.signals
 
 
+@pytest.mark.parametrize("kept", [0, 249])
+def test_answers_that_are_missing_are_not_taken_for_equal(kept):
+    recording = load_recording(START)
+    few = recording.answers[:kept]
+    for one, other in ((recording.answers, few), (few, recording.answers), (few, few)):
+        with pytest.raises(ValueError, match="shorter"):
+            compare(recording, Signals(load_database()), one, other)
+
+
 # --- The replayed log ----------------------------------------------------------------------------
 
 

@@ -184,6 +184,9 @@ class Altered:
     period: int = 100
     name: str = "altered"
 
+    def require_place(self):
+        """Here."""
+
     def replay(self, recordings):
         for recording in recordings:
             answers = replay(recording, Ecu("paper_calibrated"))
@@ -228,6 +231,58 @@ def test_missing_additional_and_reordered_frames_are_differences(golden_start, c
     assert agreement.comparison.differing_periods == 1
     assert agreement.comparison.first.signals
     assert named <= {frame.message for frame in agreement.frames}
+
+
+@dataclass(frozen=True)
+class Shortened:
+    """The firmware of this process, of whose answers some are left out."""
+
+    runs: int
+    periods: int
+    name: str = "shortened"
+
+    def require_place(self):
+        """Here."""
+
+    def replay(self, recordings):
+        return [one.answers[: self.periods] for one in recordings][: self.runs]
+
+
+@pytest.mark.parametrize(
+    ("target", "said"),
+    [
+        (Shortened(0, 250), "target 'shortened': played 0 of 1 runs"),
+        (Shortened(1, 0), "target 'shortened': answered 0 of 250 periods of charge_start"),
+        (Shortened(1, 249), "target 'shortened': answered 249 of 250 periods of charge_start"),
+    ],
+)
+def test_a_target_that_leaves_runs_or_periods_out_is_an_error(golden_start, target, said):
+    with pytest.raises(BusError, match=said):
+        compare_targets([target], golden_start)
+
+
+@pytest.mark.parametrize(
+    ("name", "built_file", "gone", "said"),
+    [
+        (NAMES[0], "linux/bms_ecu", ("linux.KERNEL", "linux.INTERFACE"), "user-mode-linux"),
+        (NAMES[1], "mps2_an386/firmware.bin", ("qemu.PROGRAM",), "qemu-system-arm"),
+    ],
+)
+def test_a_place_that_is_not_there_is_told_before_anything_is_recorded(
+    bms, monkeypatch, tmp_path, name, built_file, gone, said
+):
+    program = tmp_path / built_file
+    program.parent.mkdir()
+    program.touch()
+    for constant in gone:
+        monkeypatch.setattr(f"hil_sim.targets.{constant}", "absent0")
+    recorded = []
+    monkeypatch.setattr("hil_sim.commands.compare_targets.record_scenarios", recorded.append)
+    code, out, err = bms("compare-targets", "--target", name, "--build", tmp_path)
+    assert (code, out, recorded) == (2, "", [])
+    assert "apt-get install" in err
+    assert said in err
+    assert len(err.splitlines()) == 1
 
 
 def test_equal_answers_are_no_difference(golden_start):

@@ -21,6 +21,7 @@ MISSING = "no vcan0 and no user-mode-linux: apt-get install -y user-mode-linux"
 pytestmark = pytest.mark.skipif(not (HAS_VCAN or HAS_GUEST or "CI" in os.environ), reason=MISSING)
 
 SEED = 5
+TIMEOUT_S = 240
 SCRIPT = """
 # python-can imports asammdf where it is, which takes seconds here and is not needed.
 bms=("$PYTHON" -c 'import sys; sys.modules["asammdf"] = None; from bms.cli import main; main()')
@@ -41,10 +42,11 @@ wait $ecu; echo $? > realtime.status
 
 
 def run_in_guest(*command, folder):
-    environment = {**os.environ, "PYTHON": sys.executable, "VCAN_TIMEOUT_S": "240"}
+    environment = {**os.environ, "PYTHON": sys.executable, "VCAN_TIMEOUT_S": str(TIMEOUT_S)}
     return subprocess.run(
-        [GUEST, *command], cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
+        [GUEST, *command], cwd=folder, env=environment, capture_output=True, text=True, check=False,
+        timeout=TIMEOUT_S + 60,  # the guest ends by itself, a real vcan0 has none
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")

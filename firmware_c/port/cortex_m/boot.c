@@ -51,7 +51,7 @@ static void await_period(void)
     }
 }
 
-static void refuse(refusal_part_t part, image_status_t status)
+__attribute__((noreturn)) static void refuse(refusal_part_t part, image_status_t status)
 {
     UART0->BAUDDIV = UART_FASTEST_DIVIDER;
     UART0->CTRL = UART_CTRL_SEND | UART_CTRL_RECEIVE;
@@ -81,18 +81,18 @@ int main(void)
         memory_between(image_calibration_start, image_calibration_end);
     const image_memory_t ram = memory_between(image_ram_start, image_ram_end);
     image_status_t status = image_check_boot(&boot);
-    if (status != IMAGE_OK) {
-        refuse(REFUSAL_BOOT, status);
+    refusal_part_t part = REFUSAL_BOOT;
+    if (status == IMAGE_OK) {
+        status = image_check_application(&application, PORT_TARGET, &ram);
+        part = REFUSAL_APPLICATION;
     }
-    status = image_check_application(&application, PORT_TARGET, &ram);
-    if (status != IMAGE_OK) {
-        refuse(REFUSAL_APPLICATION, status);
+    if (status == IMAGE_OK) {
+        status = image_check_calibration(
+            &calibration, (const image_header_t *)(const void *)image_application_start);
+        part = REFUSAL_CALIBRATION;
     }
-    status = image_check_calibration(
-        &calibration, (const image_header_t *)(const void *)image_application_start);
-    if (status != IMAGE_OK) {
-        refuse(REFUSAL_CALIBRATION, status);
+    if (status == IMAGE_OK) {
+        start_application(image_application_start);
     }
-    start_application(image_application_start);
-    return 0;
+    refuse(part, status);
 }

@@ -17,7 +17,7 @@ CFLAGS := -std=c99 -Os -mthumb $(CPU) $(WARNINGS) $(NUMERICS) $(REPRODUCIBLE) \
   -I$F/include -I$F/src -I$F/generated -I$F/image -I$F/boot -I$F/port -I$F/port/cortex_m
 # Where the processor has no square root: the C library's own, without the wrapper that sets errno.
 LDFLAGS := $(CPU) -mthumb -nostartfiles --specs=nano.specs -L$F/linker \
-  -Wl,--gc-sections -Wl,--fatal-warnings -Wl,--build-id=none \
+  -Wl,--gc-sections -Wl,--fatal-warnings -Wl,--orphan-handling=error -Wl,--build-id=none \
   -Wl,--defsym=sqrtf=__ieee754_sqrtf
 
 APPLICATION_SOURCES := $(wildcard $F/src/*.c $F/generated/*.c $F/port/*.c) \
