@@ -40,6 +40,8 @@ _DEVIATIONS = {
 }
 
 
+_LIMITS = ("max_core_temperature_K", "max_surface_temperature_K")
+
 NO_CHANGES: Mapping[str, float] = MappingProxyType({})
 
 
@@ -88,9 +90,12 @@ def calibration_fields(
     }
     for name, value in changes.items():
         section = fields["rcbf"] if name in fields["rcbf"] else fields
-        if not isinstance(section.get(name), float):
+        if name in _LIMITS:
+            section[name] = _temperature_fields(value)
+        elif isinstance(section.get(name), float):
+            section[name] = float(value)
+        else:
             raise InputError(f"calibration: no constant '{name}' to change; see bms_calibration_t")
-        section[name] = type(section[name])(value)
     return fields
 
 
