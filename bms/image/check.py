@@ -42,11 +42,12 @@ def check_application(image: bytes, target: str, origin: str) -> None:
             f"{origin}: {len(image)} bytes are no whole image; {_BUILD}, and give a calibration "
             "part by --calibration"
         )
-    status = lib.image_check_boot(_memory(image, boot).place)
+    boot_memory, application_memory = _memory(image, boot), _memory(image, application)
+    status = lib.image_check_boot(boot_memory.place)
     _require(status, origin, "boot stage", _BUILD)
     ram = ffi.new("image_memory_t *", {"address": MEMORY_MAP.ram.address})
     ram.length = MEMORY_MAP.ram.length
-    status = lib.image_check_application(_memory(image, application).place, TARGETS[target], ram)
+    status = lib.image_check_application(application_memory.place, TARGETS[target], ram)
     _require(status, origin, "application", _BUILD)
     header = Header.parse(image[application.address :])
     gap = image[application.address + header.length : application.end]
@@ -67,7 +68,10 @@ def check_calibration(part: bytes, image: bytes, origin: str) -> None:
 
 
 class _Memory:
-    """Bytes of the image where the C code may read them, aligned as on the target."""
+    """Bytes of the image where the C code may read them, aligned as on the target.
+
+    `place` points into this object and is good as long as it is.
+    """
 
     def __init__(self, content: bytes, address: int) -> None:
         self._words = ffi.new("uint64_t[]", (len(content) + 7) // 8)
