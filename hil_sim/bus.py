@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import logging
 import socket
-from types import TracebackType
 from typing import Any, NamedTuple
 
 import can
 from can.interfaces.socketcan import SocketcanBus
 
 from bms.errors import BusError, InputError
+from hil_sim.closing import Closing
 from hil_sim.slcan import SCHEME, SlcanSocketBus
 
 RECEIVE_BUFFER_BYTES = 1 << 20
@@ -43,7 +43,7 @@ class _Message(can.Message):
         return self
 
 
-class CanBus:
+class CanBus(Closing):
     """An open bus; frames other than classical 11-bit data frames are not seen."""
 
     def __init__(self, name: str, bus: can.BusABC) -> None:
@@ -68,15 +68,8 @@ class CanBus:
             raise BusError(f"bus '{self.name}': cannot receive: {one_line(error)}") from None
         return None
 
-    def __enter__(self) -> CanBus:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Leave the bus."""
         self._bus.shutdown()
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 
 from hil_sim.bus import Frame
+from hil_sim.closing import Closing
 from hil_sim.logs import LogFrame, LogWriter
+from hil_sim.nodes.ecu import SYNC_ID
 
 
-class Recorder:
+class Recorder(Closing):
     """Writes frames to log files of the formats that their suffixes name.
 
     Frames of the plant count as sent (T in a candump log), those of the ECU and others as received
@@ -28,13 +29,23 @@ class Recorder:
         for writer in self._writers:
             writer.write(entry)
 
-    def __enter__(self) -> Recorder:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Complete the files."""
         self._open.close()
+
+
+class PeriodRecorder(Recorder):
+    """Keeps what the plant sends in each period of a lock-step run, in memory."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.periods: list[list[Frame]] = []
+        self._sent: list[Frame] = []
+
+    def record(self, time_s: float, frame: Frame, received: bool) -> None:
+        """Keep one frame; SYNC ends the period."""
+        if not received and frame.frame_id == SYNC_ID:
+            self.periods.append(self._sent)
+            self._sent = []
+        elif not received:
+            self._sent.append(frame)

@@ -17,7 +17,7 @@ from bms.cell import CellParameters
 from bms.presets.schema import Preset
 
 UNIT = 2.0**-24
-"""Half a unit in the last place of float32, relative."""
+"""Largest relative error of rounding to float32."""
 ROUNDINGS = 16
 
 

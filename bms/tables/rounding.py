@@ -13,13 +13,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from bms.barrier.rounding import UNIT
 from bms.errors import InputError
 from bms.kan.lags import Lag
 from bms.kan.network import INPUT_NAMES, Network
 from bms.tables.network_tables import Array, EdgeTable, NetworkTables, network_tables
 
-UNIT = 2.0**-24
-"""Largest relative error of rounding to float32."""
 PERIOD_S = 0.1
 """Control period for which the rounding of the filters of lagged inputs is bounded."""
 _SECOND_ORDER = 1.0 + 1e-5

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bms.barrier.rounding import rounding_allowances
 from bms.verification.conditions import Condition, ErrorTerm, ReadingErrors
 from bms.verification.domain import Domain, Point, Rates, weights
 from bms.verification.intervals import Interval
@@ -30,12 +29,16 @@ LARGEST_BATCH = 20_000
 
 @dataclass(frozen=True)
 class Case:
-    """One barrier: what has to hold, what is decided by, and the barrier's own decay rate."""
+    """One barrier: what has to hold, what is decided by, and the barrier's own decay rate.
+
+    `rounding` is what the firmware's arithmetic can take from the decided condition, in its unit.
+    """
 
     name: str
     required: Condition
     decided: Condition
     decay_per_s: float
+    rounding: float
 
 
 @dataclass(frozen=True)
@@ -113,11 +116,8 @@ def _examine(
         outside |= flow.rate(core_gap, coolant_gap).low > flow.largest
 
     gain = _reading_gain(decided, errors, current)
-    slack = dict(zip(("core", "surface"), rounding_allowances(domain.cell, domain.preset)))[
-        case.name
-    ]
     admitted = _value(decided, core_gap, coolant_gap, surface, core, current, cooling)
-    outside |= admitted.high + gain + slack < 0.0
+    outside |= admitted.high + gain + case.rounding < 0.0
 
     rates, enclosed = _held_rates(domain, core_gap, coolant_gap, cooling)
     slope = weights(required)
@@ -131,7 +131,7 @@ def _examine(
         _value(required, core_gap, coolant_gap, surface, core, current, cooling).low,
         _difference(required, decided, core_gap, coolant_gap, surface, core, current, cooling).low
         - gain
-        - slack,
+        - case.rounding,
     )
     timing = domain.preset.timing
     integrals = [

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bms.barrier.rounding import rounding_allowances
 from bms.kan.model_file import KanModel
 from bms.presets import Preset
 from bms.verification.conditions import (
@@ -102,13 +103,15 @@ def verify(
     core, surface = required_conditions(preset)
     decided_core, decided_surface = decided_conditions(constants)
     loose, strict = chains(preset)
-    core_case = Case("core", core, decided_core, preset.gains.core_gain_per_s(preset.cell))
+    core_rounding, surface_rounding = rounding_allowances(preset.cell, preset)
+    core_gain_per_s = preset.gains.core_gain_per_s(preset.cell)
+    core_case = Case("core", core, decided_core, core_gain_per_s, core_rounding)
     cases = [
         (certified_domain(preset, core, loose), core_case),
         *(
             (
                 certified_domain(preset, surface, chain),
-                Case("surface", surface, decided_surface, chain.second_per_s),
+                Case("surface", surface, decided_surface, chain.second_per_s, surface_rounding),
             )
             for chain in (loose, strict)
         ),

@@ -15,27 +15,12 @@ from bms.kan.basis import Array
 from hil_sim.bench.race import Rows
 from hil_sim.bus import Frame
 from hil_sim.disturbances import DisturbanceKind
-from hil_sim.nodes.ecu import SYNC_ID
-from hil_sim.recorder import Recorder
+from hil_sim.recorder import PeriodRecorder
 from hil_sim.result import TimeSeries
 from hil_sim.session import Settings, run_both
 
 _BUS = "virtual:bench-problem"
 _WIDTH_A = 1e-3
-
-
-class _Heard(Recorder):
-    """Keeps what the plant has sent, period by period."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.periods: list[list[Frame]] = [[]]
-
-    def record(self, time_s: float, frame: Frame, received: bool) -> None:
-        if not received and frame.frame_id == SYNC_ID:
-            self.periods.append([])
-        elif not received:
-            self.periods[-1].append(frame)
 
 
 @dataclass(frozen=True)
@@ -77,9 +62,9 @@ def charge_problem(preset: str, max_time_s: float = 3600.0, seed: int = 0) -> Pr
         disturbance=DisturbanceKind.BANG_BANG,
         max_time_s=max_time_s,
     )
-    heard = _Heard()
-    series = run_both(settings, heard).series
-    return _problem(firmware, series, heard.periods[:-1])
+    sent = PeriodRecorder()
+    series = run_both(settings, sent).series
+    return _problem(firmware, series, sent.periods)
 
 
 def _problem(firmware: Firmware, series: TimeSeries, frames: list[list[Frame]]) -> Problem:

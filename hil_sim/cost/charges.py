@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from bms.presets import Preset
-from hil_sim.bus import Frame
 from hil_sim.cost.records import period, restart
 from hil_sim.disturbances import DisturbanceKind
-from hil_sim.logs import read_log
-from hil_sim.nodes.ecu import SYNC_ID
-from hil_sim.recorder import Recorder
+from hil_sim.recorder import PeriodRecorder
 from hil_sim.result import CHARGING_STATES
 from hil_sim.session import Settings, run_both
 
@@ -36,12 +31,10 @@ class ChargeRecords(NamedTuple):
 
 def charge_records(settings: Settings) -> ChargeRecords:
     """Run a charge. Raises InputError or BusError."""
-    with tempfile.TemporaryDirectory() as name:
-        log = Path(name) / "charge.log"
-        with Recorder(log) as recorder:
-            states = run_both(settings, recorder).series.state
-        decides = np.array([state in CHARGING_STATES for state in states])
-        return ChargeRecords([restart(), *_periods(log)], decides)
+    sent = PeriodRecorder()
+    states = run_both(settings, sent).series.state
+    decides = np.array([state in CHARGING_STATES for state in states])
+    return ChargeRecords([restart(), *map(period, sent.periods)], decides)
 
 
 def random_charges(preset: Preset, count: int, rng: np.random.Generator) -> Iterator[bytes]:
@@ -61,13 +54,3 @@ def random_charges(preset: Preset, count: int, rng: np.random.Generator) -> Iter
             max_time_s=SHORT_CHARGE_S,
         )
         yield from charge_records(settings).records
-
-
-def _periods(log: Path) -> Iterator[bytes]:
-    frames: list[Frame] = []
-    for frame in read_log(log):
-        if frame.frame_id == SYNC_ID:
-            yield period(frames)
-            frames = []
-        elif not frame.received:
-            frames.append(Frame(frame.frame_id, frame.data))

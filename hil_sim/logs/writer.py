@@ -6,12 +6,12 @@ import gzip
 from contextlib import ExitStack
 from io import TextIOWrapper
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import can
 from can.io.logger import MESSAGE_WRITERS
 
+from hil_sim.closing import Closing
 from hil_sim.logs.formats import is_compressed, usable_format
 from hil_sim.logs.frame import LogFrame
 
@@ -20,7 +20,7 @@ CHANNEL = "vcan0"
 plays."""
 
 
-class LogWriter:
+class LogWriter(Closing):
     """Writes frames in the order of their times.
 
     Raises InputError for an unknown suffix and for a format whose library is missing; what the
@@ -52,14 +52,7 @@ class LogWriter:
             )
         )
 
-    def __enter__(self) -> LogWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Complete the file."""
         with self._files:
             self._writer.stop()

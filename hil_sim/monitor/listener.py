@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from enum import Enum
-from types import TracebackType
 from typing import Any
 
 import can
 
 from bms.errors import BusError
 from hil_sim.bus import Frame, one_line, open_interface
+from hil_sim.closing import Closing
 
 # slcan: the adapter then does not even acknowledge frames.
 # socketcan: CAN FD frames are not delivered unless asked for.
@@ -25,7 +25,7 @@ class ForeignFrame(Enum):
     FD = "FD"
 
 
-class Listener:
+class Listener(Closing):
     """Receives every frame of a bus, also the kinds that the nodes do not see."""
 
     def __init__(self, name: str) -> None:
@@ -41,15 +41,8 @@ class Listener:
             raise BusError(f"bus '{self.name}': cannot receive: {one_line(error)}") from None
         return None if message is None else _classified(message)
 
-    def __enter__(self) -> Listener:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Leave the bus."""
         self._bus.shutdown()
 
 

@@ -89,13 +89,10 @@ class LockStep:
                 return
 
 
-class PacedLockStep(LockStep):
-    """Lock step in which no period begins before its time on the wall clock."""
+class _OnTime:
+    """Periods that begin by the wall clock, and how punctual they are."""
 
-    def __init__(
-        self, period_s: float, timeout_s: float, serve: Callable[[], object] | None, clock: Clock
-    ) -> None:
-        super().__init__(period_s, timeout_s, serve)
+    def __init__(self, period_s: float, clock: Clock) -> None:
         self._clock = clock
         self._watch = PlantWatch(period_s)
 
@@ -111,6 +108,16 @@ class PacedLockStep(LockStep):
     def begin(self) -> None:
         """Note the time."""
         self._watch.begin(self._clock.now_s())
+
+
+class PacedLockStep(_OnTime, LockStep):
+    """Lock step in which no period begins before its time on the wall clock."""
+
+    def __init__(
+        self, period_s: float, timeout_s: float, serve: Callable[[], object] | None, clock: Clock
+    ) -> None:
+        _OnTime.__init__(self, period_s, clock)
+        LockStep.__init__(self, period_s, timeout_s, serve)
 
     def answers(self, bus: CanBus, period: int, is_last: IsLast) -> Iterator[Frame]:
         """Frames up to the ECU's last one."""
@@ -120,28 +127,14 @@ class PacedLockStep(LockStep):
             yield frame
 
 
-class OnClock:
+class OnClock(_OnTime):
     """Plant and ECU run on clocks of their own; there is no SYNC and nobody waits."""
 
     sync = False
 
     def __init__(self, period_s: float, clock: Clock) -> None:
-        self._clock = clock
+        super().__init__(period_s, clock)
         self._work_s = WORK_PERIODS * period_s
-        self._watch = PlantWatch(period_s)
-
-    @property
-    def watch(self) -> PlantWatch:
-        """How punctual the run is."""
-        return self._watch
-
-    def wait(self) -> None:
-        """Sleep until the next period is due."""
-        self._watch.wait(self._clock)
-
-    def begin(self) -> None:
-        """Note the time."""
-        self._watch.begin(self._clock.now_s())
 
     def time_s(self, period: int) -> float:
         """Wall-clock time since the first period began."""

@@ -9,11 +9,11 @@ import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import IO
 
 from bms.errors import BusError, InputError
 from bms.image import TARGETS
+from hil_sim.closing import Closing
 
 PROGRAM = "qemu-system-arm"
 HOST = "127.0.0.1"
@@ -28,7 +28,7 @@ def require_emulator() -> str:
     return program
 
 
-class Emulation:
+class Emulation(Closing):
     """A running board; a context manager that ends it.
 
     `bus` is the name under which hil_sim.bus.open_bus reaches its serial line, which one party at
@@ -100,7 +100,7 @@ class Emulation:
         except subprocess.TimeoutExpired:
             return None
 
-    def stop(self) -> None:
+    def close(self) -> None:
         """Switch the board off."""
         self._process.terminate()
         try:
@@ -110,17 +110,6 @@ class Emulation:
             self._process.wait()
         if not isinstance(self._log, int):
             self._log.close()
-
-    def __enter__(self) -> Emulation:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.stop()
 
 
 @contextmanager

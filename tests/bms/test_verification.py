@@ -14,6 +14,7 @@ from scipy.integrate import quad, solve_ivp
 from typer import Typer
 from typer.testing import CliRunner
 
+from bms.barrier.rounding import rounding_allowances
 from bms.cell import CellState, Disturbance, integrate_step, rates
 from bms.commands.verify import verify as command
 from bms.firmware import Firmware
@@ -133,7 +134,11 @@ def test_a_quarter_of_a_margin_is_not_certified(name, margin):
     chain = chains(preset)[1]
     decay_per_s = preset.gains.core_gain_per_s(preset.cell) if index == 0 else chain.second_per_s
     case = Case(
-        ("core", "surface")[index], condition, decided_conditions(constants)[index], decay_per_s
+        ("core", "surface")[index],
+        condition,
+        decided_conditions(constants)[index],
+        decay_per_s,
+        rounding_allowances(preset.cell, preset)[index],
     )
 
     certificate = certify(
