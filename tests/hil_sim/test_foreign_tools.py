@@ -29,7 +29,8 @@ MALFORMED_BEGIN_LINE = " 7E1#BE61"
 COLUMNS, ROWS = 80, 24
 
 # Without the optional reader of .mf4, whose import takes most of a command's start in the guest;
-# exec, so that the process number of a job is the command's own.
+# exec, so that the process number of a job is the command's own. script starts $SHELL, which need
+# not be set, and only bash knows the exported function.
 SCRIPT = r"""
 bms() {
   exec "$PYTHON" -c \
@@ -45,6 +46,7 @@ await() { until [ "$(grep -c "$1" charge.log)" -ge "$2" ] || plant_ended; do sle
 . ./charge
 plant=$!
 mkfifo keys
+export SHELL=$BASH
 script -qfc "stty cols COLUMNS rows ROWS; bms monitor --bus socketcan:vcan0" screen < keys > out &
 exec 3> keys
 await ' 080#' 250
