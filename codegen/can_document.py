@@ -45,15 +45,16 @@ def can_document(firmware: Path) -> str:
 
 def _message(database: Database, message: Message) -> dict[str, Any]:
     is_for_ecu = message.senders != [ECU]
+    timeout_ms = number_attribute(database, message, TIMEOUT_ATTRIBUTE)
     return {
         "name": message.name,
         "id": message.frame_id,
         "length": message.length,
         "direction": "plant to ECU" if is_for_ecu else "ECU to plant",
         "cycle_ms": number_attribute(database, message, CYCLE_ATTRIBUTE),
-        "timeout_ms": number_attribute(database, message, TIMEOUT_ATTRIBUTE),
+        "timeout_ms": timeout_ms,
         "is_protected": bool(data_ids(message)),
-        "is_supervised": is_for_ecu and bool(data_ids(message)),
+        "is_supervised": timeout_ms > 0 and bool(data_ids(message)),
         "limits": [number_attribute(database, message, name) for name in _LIMITS],
         "data_ids": data_ids(message).hex(" "),
         "comment": message.comment,

@@ -23,7 +23,11 @@ class Sender:
 
 
 class Receiver:
-    """Takes new, intact frames of one message; the counter must move, by however much."""
+    """Takes new, intact frames of one message; the counter must move, by however much.
+
+    For reports and for controllers that are compared with. What acts on the cell goes through
+    bms.firmware.Reception, which also judges a message over several periods.
+    """
 
     def __init__(self, codec: MessageCodec) -> None:
         self._codec = codec

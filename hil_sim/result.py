@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from bms.cell import CellState
+from bms.firmware import ReceptionCounts
 from hil_sim.faults.injection import InjectedFault
 from hil_sim.nodes.line_losses import LineLosses
 from hil_sim.nodes.plant import Answer
@@ -87,6 +88,8 @@ class Summary:
     realtime: bool
     model_hash: str | None
     preset_hash: str
+    command_reception: ReceptionCounts
+    """Charge commands that the charger refused or missed, by kind."""
     faults: tuple[InjectedFault, ...] = ()
     timing: Timing | None = None
     line_losses: LineLosses | None = None

@@ -309,6 +309,7 @@ def _sum_up(
         realtime=settings.realtime,
         model_hash=charge.identity.model if charge.identity else None,
         preset_hash=settings.preset.hash,
+        command_reception=charge.node.command_counts,
         faults=charge.injection.injected,
         timing=watch.timing([command is not None for command in series.command_A])
         if watch is not None

@@ -26,6 +26,8 @@ SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 _HOST_DECLARATIONS = """
 const bms_calibration_t *host_default_calibration(void);
 const fault_policy_t *host_fault_policies(void);
+const codec_message_t *host_transmitted_messages(void);
+uint32_t host_transmitted_count(void);
 void host_estimate_rows(const kan_model_t *model, const float *inputs, uint32_t rows,
                         float *core_temperature_K, uint8_t *in_domain);
 void host_edge_values(const kan_model_t *model, uint32_t edge, const float *arguments,
@@ -37,6 +39,7 @@ uint32_t host_run_periods(bms_t *bms, const can_frame_t *received, uint32_t fram
 """
 _HOST_SOURCE = """
 #include "bms.h"
+#include "can_catalog.h"
 #include "image.h"
 
 static const bms_calibration_t *host_default_calibration(void)
@@ -47,6 +50,16 @@ static const bms_calibration_t *host_default_calibration(void)
 static const fault_policy_t *host_fault_policies(void)
 {
     return MONITOR_POLICY;
+}
+
+static const codec_message_t *host_transmitted_messages(void)
+{
+    return CAN_TRANSMITTED;
+}
+
+static uint32_t host_transmitted_count(void)
+{
+    return CAN_TRANSMITTED_COUNT;
 }
 
 static void host_estimate_rows(const kan_model_t *model, const float *inputs, uint32_t rows,

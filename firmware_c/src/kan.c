@@ -75,28 +75,28 @@ bool kan_model_is_valid(const kan_model_t *model)
                                        edges * model->cells * KAN_CELL_COEFFICIENTS);
 }
 
-/* False for NaN too. */
-static bool is_near(float value, float clamped)
-{
-    const float beyond = value - clamped;
-    return (beyond <= KAN_FACE_TOLERANCE) && (beyond >= -KAN_FACE_TOLERANCE);
-}
-
 typedef char kan_horner_has_all_coefficients[(KAN_CELL_COEFFICIENTS == 8) ? 1 : -1];
 
 static inline float edge_value(const float *knots, const float *coefficients, uint32_t cells,
                                float x, bool *in_domain)
 {
-    const float clamped = numeric_clamp(x, knots[0], knots[cells]);
-    if (!is_near(x, clamped)) {
-        *in_domain = false;
+    /* Written so that an argument within the knots takes two comparisons, and NaN the first way. */
+    const float first = knots[0];
+    const float last = knots[cells];
+    float inside = x;
+    if (!(x >= first)) {
+        inside = first;
+        *in_domain &= (first - x <= KAN_FACE_TOLERANCE);
+    } else if (!(x <= last)) {
+        inside = last;
+        *in_domain &= (x - last <= KAN_FACE_TOLERANCE);
     }
     uint32_t cell = 0u;
-    while ((cell + 1u < cells) && (clamped >= knots[cell + 1u])) {
+    while ((cell + 1u < cells) && (inside >= knots[cell + 1u])) {
         cell++;
     }
     const float middle = 0.5f * (knots[cell] + knots[cell + 1u]);
-    const float d = clamped - middle;
+    const float d = inside - middle;
     const float *c = &coefficients[cell * KAN_CELL_COEFFICIENTS];
     return ((((((c[7] * d + c[6]) * d + c[5]) * d + c[4]) * d + c[3]) * d + c[2]) * d + c[1]) * d +
            c[0];
@@ -137,12 +137,18 @@ kan_estimate_t kan_evaluate(const kan_model_t *model, const float *inputs)
     for (uint32_t i = 0u; i < model->width[0]; i++) {
         const float value = (inputs[i] - model->input_center[i]) * model->input_scale[i];
         normalised[i] = value;
-        nodes[i] = numeric_clamp(value, -model->input_reach, model->input_reach);
-        if (!((value >= -KAN_FACE) && (value <= KAN_FACE))) {
-            estimate.in_domain = false;
+        float node = value;
+        if (!((value >= -1.0f) && (value <= 1.0f))) {
+            node = numeric_clamp(value, -model->input_reach, model->input_reach);
+            if (!((value >= -KAN_FACE) && (value <= KAN_FACE))) {
+                estimate.in_domain = false;
+            }
         }
+        nodes[i] = node;
     }
-    estimate.in_domain = is_in_slabs(model, normalised) && estimate.in_domain;
+    if (!is_in_slabs(model, normalised)) {
+        estimate.in_domain = false;
+    }
     const uint32_t cells = model->cells;
     const float *knots = model->knots;
     const float *coefficients = model->coefficients;

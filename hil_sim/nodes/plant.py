@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bms.errors import BusError
+from bms.firmware import Reception, ReceptionCounts
 from hil_sim.bus import CanBus, Frame, ecu_remedy, is_line
 from hil_sim.database import MessageCodec, Values
 from hil_sim.e2e import Receiver, Sender
@@ -17,8 +18,7 @@ REQUEST_OFF, REQUEST_CHARGE = 0, 1
 NO_FAULT = 255
 CONNECT_ATTEMPTS = 10
 
-_FROM_ECU = (
-    "ChargeCommand",
+_REPORTS = (
     "Estimate",
     "Decision",
     "DecisionMargins",
@@ -98,12 +98,18 @@ class PlantNode:
         self._coolant = Sender(database["Coolant"])
         self._request = Sender(database["ChargeRequest"])
         self._sync = Frame(database["SYNC"].frame_id, b"")
-        self._receivers = {database[name].frame_id: Receiver(database[name]) for name in _FROM_ECU}
+        self._receivers = {database[name].frame_id: Receiver(database[name]) for name in _REPORTS}
         self._command = database["ChargeCommand"]
+        self._reception = Reception(self._command.frame_id)
         self._states = database["ChargeCommand"].choices["CommandState"]
         self._constraints = database["Decision"].choices["ActiveConstraint"]
         self._connected = False
         self._is_answer_late = False
+
+    @property
+    def command_counts(self) -> ReceptionCounts:
+        """Charge commands that were not as they should be."""
+        return self._reception.counts
 
     def wait(self) -> None:
         """Return when the next period is due; at once in virtual time."""
@@ -180,9 +186,16 @@ class PlantNode:
 
     def _answer(self, heard: list[Frame]) -> Answer:
         values: Values = {}
+        command: Values = {}
         for frame in heard:
             receiver = self._receivers.get(frame.frame_id)
-            values.update((receiver.accept(frame.data) if receiver else None) or {})
+            if receiver is not None:
+                values.update(receiver.accept(frame.data) or {})
+            elif frame.frame_id == self._command.frame_id and self._reception.check(frame.data):
+                command = self._command.decode(frame.data) or {}
+        # What flows through the cell hangs on this message: it has to be valid, not just intact.
+        if self._reception.end_period():
+            values.update(command)
         return Answer(values, self._states, self._constraints)
 
 

@@ -4,6 +4,7 @@ import can
 import pytest
 
 from bms.errors import BusError
+from bms.firmware import ReceptionCounts
 from hil_sim.bus import Frame, open_bus
 from hil_sim.e2e import Sender
 from hil_sim.nodes.plant import CONNECT_ATTEMPTS, PlantNode, Request
@@ -12,6 +13,7 @@ from hil_sim.recorder import Recorder
 from hil_sim.sensors import Readings
 
 READINGS = Readings(-1.0, 3.3, 300.0, 299.0, 1.0)
+PERIODS_TO_TRUST = 3
 REQUEST = Request(charge=False, reference_current_A=-23.0, plug_in_soc=0.1)
 
 
@@ -32,6 +34,19 @@ class Wire:
         self.heard.append(heard)
         self._serve(self)
 
+    def trusted(self):
+        """After the periods that make the charge command valid."""
+        serve, self._serve = self._serve, lambda wire: wire.command(-0.5)
+        answers = [self.node.exchange(n, READINGS, REQUEST) for n in range(PERIODS_TO_TRUST)]
+        assert [answer.command_A for answer in answers[:-1]] == [None] * (PERIODS_TO_TRUST - 1)
+        assert answers[-1].command_A == pytest.approx(-0.5)
+        self.heard.clear()
+        self._serve = serve
+        return self
+
+    def exchange(self):
+        return self.node.exchange(len(self.heard), READINGS, REQUEST)
+
     def command(self, current_A):
         self.far.send(self._command.frame({"CommandCurrent": current_A, "CommandState": 2}))
 
@@ -45,7 +60,7 @@ class Wire:
 
 def test_measurements_come_before_sync(database):
     with Wire("virtual:order", database, lambda wire: wire.command(-1.0)) as wire:
-        answer = wire.node.exchange(0, READINGS, REQUEST)
+        answer = wire.trusted().exchange()
     assert [frame.frame_id for frame in wire.heard[0]] == [0x100, 0x101, 0x102, 0x103, 0x080]
     assert answer.command_A == pytest.approx(-1.0)
     assert answer.state == "charging"
@@ -53,13 +68,12 @@ def test_measurements_come_before_sync(database):
 
 def test_an_answer_that_comes_too_late_is_not_taken_for_the_next_one(database):
     with Wire("virtual:late", database, lambda wire: wire.command(-1.0)) as wire:
-        wire.node.exchange(0, READINGS, REQUEST)
-        wire._serve = lambda wire: None
-        assert wire.node.exchange(1, READINGS, REQUEST).command_A is None
+        wire.trusted()._serve = lambda wire: None
+        assert wire.exchange().command_A is None
         wire.command(-7.0)
         wire._serve = lambda wire: wire.command(-2.0)
-        assert wire.node.exchange(2, READINGS, REQUEST).command_A == pytest.approx(-2.0)
-        assert wire.node.exchange(3, READINGS, REQUEST).command_A == pytest.approx(-2.0)
+        assert wire.exchange().command_A == pytest.approx(-2.0)
+        assert wire.exchange().command_A == pytest.approx(-2.0)
 
 
 def test_a_repeated_or_corrupt_command_is_none(database):
@@ -75,23 +89,46 @@ def test_a_repeated_or_corrupt_command_is_none(database):
         wire.far.send(frame._replace(data=frame.data[:3] + bytes([frame.data[3] ^ 1])))
 
     with Wire("virtual:repeat", database, repeat) as wire:
-        assert wire.node.exchange(0, READINGS, REQUEST).command_A == pytest.approx(-5.0)
-        assert wire.node.exchange(1, READINGS, REQUEST).command_A is None
+        assert wire.trusted().exchange().command_A == pytest.approx(-5.0)
+        assert wire.exchange().command_A is None
         wire._serve = corrupt
-        assert wire.node.exchange(2, READINGS, REQUEST).command_A is None
+        assert wire.exchange().command_A is None
+        assert wire.node.command_counts == ReceptionCounts(0, 1, 1, 0, 0)
+
+
+def command_beside_a_damaged_one(wire):
+    wire.far.send(Frame(0x180, bytes(4)))
+    wire.command(-1.0 - len(wire.heard))
 
 
 def test_a_damaged_command_from_elsewhere_does_not_end_the_answer(database):
     """Otherwise each such frame would leave the plant one more period ahead of the ECU."""
+    with Wire("virtual:damaged", database, command_beside_a_damaged_one) as wire:
+        wire.trusted()
+        for period in range(2):
+            assert wire.exchange().command_A == pytest.approx(-2.0 - period)
+
+
+def test_a_charger_does_not_rely_on_a_command_that_comes_often_damaged(database):
+    """Three bad periods of the last five, though a good frame came in each as well."""
+    with Wire("virtual:disturbed", database, command_beside_a_damaged_one) as wire:
+        wire.trusted()
+        assert [wire.exchange().command_A is None for _ in range(4)] == [False, False, True, True]
+        wire._serve = lambda wire: wire.command(-3.0)
+        back = [wire.exchange().command_A for _ in range(4)]
+        assert back == [None, None, None, pytest.approx(-3.0)]
+        assert wire.node.command_counts.wrong_crc == 4
+
+
+def test_a_random_intact_command_out_of_sequence_is_refused(database):
+    """One random frame in 256 passes the CRC; the counter has to follow as well."""
+    codec = database["ChargeCommand"]
 
     def serve(wire):
-        wire.far.send(Frame(database["ChargeCommand"].frame_id, bytes(4)))
-        wire.command(-1.0 - len(wire.heard))
+        wire.far.send(Frame(codec.frame_id, codec.encode({"CommandCurrent": -20.0}, counter=11)))
 
-    with Wire("virtual:damaged", database, serve) as wire:
-        for period in range(3):
-            answer = wire.node.exchange(period, READINGS, REQUEST)
-            assert answer.command_A == pytest.approx(-2.0 - period)
+    with Wire("virtual:random", database, serve) as wire:
+        assert wire.trusted().exchange().command_A is None
 
 
 def test_an_ecu_that_starts_later_hears_the_first_period_as_if_it_were_sent_once(
