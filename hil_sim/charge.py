@@ -78,7 +78,7 @@ class Charge:
             self.injection.begin(self._charge_period, self.plant)
             answer = self.node.exchange(self.steps, self._measure(), self._request())
             self.plant.current_A = self.injection.supplied_A(
-                self.charger.current_A(answer.command_A), self.plant.current_A
+                self.charger.current_A(answer.usable_command_A), self.plant.current_A
             )
             self._note(answer)
             self.steps += 1

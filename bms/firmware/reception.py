@@ -50,7 +50,7 @@ class Reception:
         return bool(status == lib.E2E_OK)
 
     def end_period(self) -> bool:
-        """Whether what this period brought may be used: a good frame, of a message that is valid."""
+        """Whether this period brought a frame to be used: a good one, of a valid message."""
         return bool(lib.e2e_supervise(self._state, self._policy).is_usable)
 
     @property

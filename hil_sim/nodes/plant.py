@@ -42,8 +42,15 @@ class Request:
 class Answer:
     """What the ECU said in one period: values by signal name, None where it said nothing."""
 
-    def __init__(self, values: Values, states: dict[int, str], constraints: dict[int, str]) -> None:
+    def __init__(
+        self,
+        values: Values,
+        is_command_usable: bool,
+        states: dict[int, str],
+        constraints: dict[int, str],
+    ) -> None:
         self._values = values
+        self._is_command_usable = is_command_usable
         self._states = states
         self._constraints = constraints
 
@@ -55,6 +62,11 @@ class Answer:
     def command_A(self) -> float | None:
         """Commanded current in A."""
         return self.value("CommandCurrent")
+
+    @property
+    def usable_command_A(self) -> float | None:
+        """The same in A for a charger, to which the message has to be valid, not just intact."""
+        return self.command_A if self._is_command_usable else None
 
     @property
     def state(self) -> str | None:
@@ -186,17 +198,14 @@ class PlantNode:
 
     def _answer(self, heard: list[Frame]) -> Answer:
         values: Values = {}
-        command: Values = {}
         for frame in heard:
             receiver = self._receivers.get(frame.frame_id)
             if receiver is not None:
                 values.update(receiver.accept(frame.data) or {})
             elif frame.frame_id == self._command.frame_id and self._reception.check(frame.data):
-                command = self._command.decode(frame.data) or {}
-        # What flows through the cell hangs on this message: it has to be valid, not just intact.
-        if self._reception.end_period():
-            values.update(command)
-        return Answer(values, self._states, self._constraints)
+                values.update(self._command.decode(frame.data) or {})
+        is_usable = self._reception.end_period()
+        return Answer(values, is_usable, self._states, self._constraints)
 
 
 def _choice(names: dict[int, str], value: float | None) -> str | None:

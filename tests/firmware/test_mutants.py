@@ -45,7 +45,7 @@ MUTANTS = [
     Mutant("an empty interval gives 0 A", "rcbf.c", "decision.feasible ? decision.lower_A : 0.0f", "decision.lower_A", DECISION, "infeasible"),
     Mutant("not a number is refused", "rcbf.c", "if (!is_physical(input))", "if (input->reference_current_A > 0.0f)", DECISION, "no_number"),
     Mutant("extrapolation is flagged", "kan.c", "estimate.in_domain = false;", "estimate.in_domain = true;", ESTIMATE, "flagged"),
-    Mutant("combinations never seen are flagged", "kan.c", "is_in_slabs(model, normalised) && ", "", ESTIMATE, "combination"),
+    Mutant("combinations never seen are flagged", "kan.c", "!is_in_slabs(model, normalised)", "false", ESTIMATE, "combination"),
     Mutant("filters are trusted only when settled", "history.c", "history->periods >= model->settling_periods", "history->periods >= 0u", HISTORY, "init_until"),
     Mutant("an ECU with memory waits in init", "bms.c", "if (history_is_settling(", "if (!history_is_settling(", HISTORY, "init_until"),
     Mutant("faults are seen while filters settle", "bms.c", "symptoms & ~bit_if(true, FAULT_OUT_OF_DOMAIN)", "0u", HISTORY, "faults_are_seen"),

@@ -38,8 +38,8 @@ class Wire:
         """After the periods that make the charge command valid."""
         serve, self._serve = self._serve, lambda wire: wire.command(-0.5)
         answers = [self.node.exchange(n, READINGS, REQUEST) for n in range(PERIODS_TO_TRUST)]
-        assert [answer.command_A for answer in answers[:-1]] == [None] * (PERIODS_TO_TRUST - 1)
-        assert answers[-1].command_A == pytest.approx(-0.5)
+        commands_A = [answer.usable_command_A for answer in answers]
+        assert commands_A == [None] * (PERIODS_TO_TRUST - 1) + [pytest.approx(-0.5)]
         self.heard.clear()
         self._serve = serve
         return self
@@ -58,22 +58,29 @@ class Wire:
         self.far.__exit__(None, None, None)
 
 
+def test_what_an_ecu_says_is_told_before_a_charger_may_use_it(database):
+    with Wire("virtual:told", database, lambda wire: wire.command(-1.0)) as wire:
+        answer = wire.exchange()
+    assert answer.command_A == pytest.approx(-1.0)
+    assert answer.usable_command_A is None
+
+
 def test_measurements_come_before_sync(database):
     with Wire("virtual:order", database, lambda wire: wire.command(-1.0)) as wire:
         answer = wire.trusted().exchange()
     assert [frame.frame_id for frame in wire.heard[0]] == [0x100, 0x101, 0x102, 0x103, 0x080]
-    assert answer.command_A == pytest.approx(-1.0)
+    assert answer.usable_command_A == pytest.approx(-1.0)
     assert answer.state == "charging"
 
 
 def test_an_answer_that_comes_too_late_is_not_taken_for_the_next_one(database):
     with Wire("virtual:late", database, lambda wire: wire.command(-1.0)) as wire:
         wire.trusted()._serve = lambda wire: None
-        assert wire.exchange().command_A is None
+        assert wire.exchange().usable_command_A is None
         wire.command(-7.0)
         wire._serve = lambda wire: wire.command(-2.0)
-        assert wire.exchange().command_A == pytest.approx(-2.0)
-        assert wire.exchange().command_A == pytest.approx(-2.0)
+        assert wire.exchange().usable_command_A == pytest.approx(-2.0)
+        assert wire.exchange().usable_command_A == pytest.approx(-2.0)
 
 
 def test_a_repeated_or_corrupt_command_is_none(database):
@@ -89,10 +96,10 @@ def test_a_repeated_or_corrupt_command_is_none(database):
         wire.far.send(frame._replace(data=frame.data[:3] + bytes([frame.data[3] ^ 1])))
 
     with Wire("virtual:repeat", database, repeat) as wire:
-        assert wire.trusted().exchange().command_A == pytest.approx(-5.0)
-        assert wire.exchange().command_A is None
+        assert wire.trusted().exchange().usable_command_A == pytest.approx(-5.0)
+        assert wire.exchange().usable_command_A is None
         wire._serve = corrupt
-        assert wire.exchange().command_A is None
+        assert wire.exchange().usable_command_A is None
         assert wire.node.command_counts == ReceptionCounts(0, 1, 1, 0, 0)
 
 
@@ -106,16 +113,17 @@ def test_a_damaged_command_from_elsewhere_does_not_end_the_answer(database):
     with Wire("virtual:damaged", database, command_beside_a_damaged_one) as wire:
         wire.trusted()
         for period in range(2):
-            assert wire.exchange().command_A == pytest.approx(-2.0 - period)
+            assert wire.exchange().usable_command_A == pytest.approx(-2.0 - period)
 
 
 def test_a_charger_does_not_rely_on_a_command_that_comes_often_damaged(database):
     """Three bad periods of the last five, though a good frame came in each as well."""
     with Wire("virtual:disturbed", database, command_beside_a_damaged_one) as wire:
         wire.trusted()
-        assert [wire.exchange().command_A is None for _ in range(4)] == [False, False, True, True]
+        refused = [wire.exchange().usable_command_A is None for _ in range(4)]
+        assert refused == [False, False, True, True]
         wire._serve = lambda wire: wire.command(-3.0)
-        back = [wire.exchange().command_A for _ in range(4)]
+        back = [wire.exchange().usable_command_A for _ in range(4)]
         assert back == [None, None, None, pytest.approx(-3.0)]
         assert wire.node.command_counts.wrong_crc == 4
 
@@ -128,7 +136,7 @@ def test_a_random_intact_command_out_of_sequence_is_refused(database):
         wire.far.send(Frame(codec.frame_id, codec.encode({"CommandCurrent": -20.0}, counter=11)))
 
     with Wire("virtual:random", database, serve) as wire:
-        assert wire.trusted().exchange().command_A is None
+        assert wire.trusted().exchange().usable_command_A is None
 
 
 def test_an_ecu_that_starts_later_hears_the_first_period_as_if_it_were_sent_once(

@@ -162,7 +162,7 @@ def record(name: str, path: Path) -> None:
                     Request(is_on, preset.limits.reference_current_A, plug_in_soc),
                 )
                 plant.current_A = injection.supplied_A(
-                    charger.current_A(answer.command_A), plant.current_A
+                    charger.current_A(answer.usable_command_A), plant.current_A
                 )
                 plant.advance()
 
