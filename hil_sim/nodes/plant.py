@@ -115,6 +115,7 @@ class PlantNode:
         self._reception = Reception(self._command.frame_id)
         self._states = database["ChargeCommand"].choices["CommandState"]
         self._constraints = database["Decision"].choices["ActiveConstraint"]
+        self._last_counter: int | None = None
         self._connected = False
         self._is_answer_late = False
 
@@ -149,13 +150,15 @@ class PlantNode:
                 (self._turn.time_s(period), frame)
                 for frame in self._turn.answers(self._bus, period, self._is_last)
             ]
-            is_answered = any(self._is_last(frame) for _, frame in heard)
-            self._connected = self._connected or is_answered
+            last = next((frame for _, frame in heard if self._is_last(frame)), None)
+            self._connected = self._connected or last is not None
             if self._connected or not self._turn.sync:
                 break
         else:
             raise BusError(f"bus '{self._bus.name}': no ECU answers; {ecu_remedy(self._bus.name)}")
-        self._is_answer_late = not is_answered
+        self._is_answer_late = last is None
+        if last is not None:
+            self._last_counter = self._command.counter(last.data)
         if self._recorder is not None:
             for time_s, frame in late:
                 self._recorder.record(time_s, frame, received=True)
@@ -166,8 +169,15 @@ class PlantNode:
         return self._answer(self._heard([frame for _, frame in heard]))
 
     def _is_last(self, frame: Frame) -> bool:
-        """A damaged frame of that identifier, whoever sent it, does not end the ECU's answer."""
-        return frame.frame_id == self._command.frame_id and self._command.is_intact(frame.data)
+        """A damaged or repeated frame of that identifier, whoever sent it, does not end the answer.
+
+        It would leave the plant one period ahead of the ECU, with commands that are that much older.
+        """
+        return (
+            frame.frame_id == self._command.frame_id
+            and self._command.is_intact(frame.data)
+            and self._command.counter(frame.data) != self._last_counter
+        )
 
     def _late_frames(self, period: int) -> list[tuple[float, Frame]]:
         """What came too late for the last period; it must not pass for an answer to this one."""

@@ -116,6 +116,21 @@ def test_a_damaged_command_from_elsewhere_does_not_end_the_answer(database):
             assert wire.exchange().usable_command_A == pytest.approx(-2.0 - period)
 
 
+def test_a_masquerade_with_a_frozen_counter_does_not_end_the_answer(database):
+    """Otherwise commands would come later by a period with each such frame."""
+    codec = database["ChargeCommand"]
+
+    def serve(wire):
+        frozen = codec.encode({"CommandCurrent": -20.0}, PERIODS_TO_TRUST - 1)
+        wire.far.send(Frame(codec.frame_id, frozen))
+        wire.command(-1.0 - len(wire.heard))
+
+    with Wire("virtual:masquerade", database, serve) as wire:
+        wire.trusted()
+        commands_A = [wire.exchange().usable_command_A for _ in range(4)]
+    assert commands_A == [pytest.approx(-2.0 - period) for period in range(4)]
+
+
 def test_a_charger_does_not_rely_on_a_command_that_comes_often_damaged(database):
     """Three bad periods of the last five, though a good frame came in each as well."""
     with Wire("virtual:disturbed", database, command_beside_a_damaged_one) as wire:
