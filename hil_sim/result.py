@@ -31,6 +31,8 @@ class TimeSeries:
     surface_temperature_K: list[float] = field(default_factory=list)
     coolant_temperature_K: list[float] = field(default_factory=list)
     command_A: list[float | None] = field(default_factory=list)
+    usable_command_A: list[float | None] = field(default_factory=list)
+    """What of it the charger may use."""
     estimated_core_temperature_K: list[float | None] = field(default_factory=list)
     estimated_soc: list[float | None] = field(default_factory=list)
     state: list[str | None] = field(default_factory=list)
@@ -50,6 +52,7 @@ class TimeSeries:
         self.surface_temperature_K.append(state.surface_temperature_K)
         self.coolant_temperature_K.append(state.coolant_temperature_K)
         self.command_A.append(answer.command_A)
+        self.usable_command_A.append(answer.usable_command_A)
         self.estimated_core_temperature_K.append(answer.value("CoreTemperature"))
         self.estimated_soc.append(answer.value("StateOfCharge"))
         self.state.append(answer.state)
@@ -89,7 +92,7 @@ class Summary:
     model_hash: str | None
     preset_hash: str
     command_reception: ReceptionCounts
-    """Charge commands that the charger refused or missed, by kind."""
+    """Charge commands that the charger refused, or missed as far as the next counter shows."""
     faults: tuple[InjectedFault, ...] = ()
     timing: Timing | None = None
     line_losses: LineLosses | None = None

@@ -43,7 +43,7 @@ class _Seen:
         begin = next(i for i, t in enumerate(series.time_s) if t > (window.start - 0.5) * period_s)
         self.end = len(window) if not row.fault.is_for_good else len(series.time_s) - begin
         self.flowing_A = series.current_A[begin:]
-        self.command_A = series.command_A[begin:]
+        self.command_A = series.usable_command_A[begin:]
         self.state = series.state[begin:]
         self.latched = series.latched_faults[begin:]
         self.before_A = series.current_A[begin - 1] if begin else 0.0

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from bms.errors import BusError
 from bms.firmware import Reception, ReceptionCounts
 from hil_sim.bus import CanBus, Frame, ecu_remedy, is_line
-from hil_sim.database import MessageCodec, Values
+from hil_sim.database import COUNTER_MODULUS, MessageCodec, Values
 from hil_sim.e2e import Receiver, Sender
 from hil_sim.nodes.turns import Turn
 from hil_sim.recorder import Recorder
@@ -150,15 +150,14 @@ class PlantNode:
                 (self._turn.time_s(period), frame)
                 for frame in self._turn.answers(self._bus, period, self._is_last)
             ]
-            last = next((frame for _, frame in heard if self._is_last(frame)), None)
-            self._connected = self._connected or last is not None
+            is_answered = any(self._is_last(frame) for _, frame in heard)
+            self._connected = self._connected or is_answered
             if self._connected or not self._turn.sync:
                 break
         else:
             raise BusError(f"bus '{self._bus.name}': no ECU answers; {ecu_remedy(self._bus.name)}")
-        self._is_answer_late = last is None
-        if last is not None:
-            self._last_counter = self._command.counter(last.data)
+        self._is_answer_late = not is_answered
+        self._follow([frame for _, frame in (*late, *heard)])
         if self._recorder is not None:
             for time_s, frame in late:
                 self._recorder.record(time_s, frame, received=True)
@@ -169,15 +168,21 @@ class PlantNode:
         return self._answer(self._heard([frame for _, frame in heard]))
 
     def _is_last(self, frame: Frame) -> bool:
-        """A damaged or repeated frame of that identifier, whoever sent it, does not end the answer.
+        """Whether it is the charge command that continues from the last one.
 
-        It would leave the plant one period ahead of the ECU, with commands that are that much older.
+        A damaged or repeated one of somebody else must not end the answer: it would leave the plant
+        a period ahead of the ECU, with commands that are that much older.
         """
-        return (
-            frame.frame_id == self._command.frame_id
-            and self._command.is_intact(frame.data)
-            and self._command.counter(frame.data) != self._last_counter
-        )
+        if frame.frame_id != self._command.frame_id or not self._command.is_intact(frame.data):
+            return False
+        counter = self._command.counter(frame.data)
+        return self._last_counter in (None, (counter - 1) % COUNTER_MODULUS)
+
+    def _follow(self, frames: list[Frame]) -> None:
+        """Also after lost frames and a restart of the ECU, which cost one wait for an answer."""
+        for frame in frames:
+            if frame.frame_id == self._command.frame_id and self._command.is_intact(frame.data):
+                self._last_counter = self._command.counter(frame.data)
 
     def _late_frames(self, period: int) -> list[tuple[float, Frame]]:
         """What came too late for the last period; it must not pass for an answer to this one."""

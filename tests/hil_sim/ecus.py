@@ -27,6 +27,26 @@ class SilentAfter:
         return frames if self._steps_left >= 0 else []
 
 
+class OftenDamaged:
+    """The firmware, with a damaged charge command before each intact one after some steps."""
+
+    def __init__(self, preset, steps):
+        self._ecu = Ecu(preset=preset)
+        self.receive = self._ecu.receive
+        self._steps_left = steps
+
+    def step(self):
+        self._ecu.step()
+        self._steps_left -= 1
+
+    def transmit(self):
+        *others, (command_id, data) = self._ecu.transmit()
+        damaged = (
+            [] if self._steps_left >= 0 else [(command_id, data[:-1] + bytes([~data[-1] & 255]))]
+        )
+        return [*others, *damaged, (command_id, data)]
+
+
 class HotterThanAllowed:
     """The firmware with temperature limits that are too high by some kelvin, and no identity."""
 

@@ -11,7 +11,7 @@ from bms.presets import load_preset
 from hil_sim.disturbances import DisturbanceKind
 from hil_sim.recorder import Recorder
 from hil_sim.session import ControllerKind, Settings, run_both
-from tests.hil_sim.ecus import HotterThanAllowed, SilentAfter
+from tests.hil_sim.ecus import HotterThanAllowed, OftenDamaged, SilentAfter
 
 SHORT_S = 20.0
 
@@ -110,6 +110,23 @@ def test_the_charger_stops_when_the_ecu_falls_silent(preset):
     assert result.series.command_A[steps:] == [None] * (len(current_A) - steps)
     assert current_A[steps - 1] == current_A[steps] < 0.0
     assert set(current_A[steps + 1 :]) == {0.0}
+
+
+def test_the_charger_stops_when_commands_come_often_damaged(preset):
+    """Each period brings an intact one too; after three bad periods the message is not valid."""
+    steps = 50
+    result = run_both(
+        Settings(preset), ecu_factory=lambda plant, database: OftenDamaged(preset, steps)
+    )
+    series = result.series
+    assert result.summary.stop_reason == "fault"
+    assert None not in series.command_A
+    assert series.current_A[: steps + 2] == [
+        command_A or 0.0 for command_A in series.usable_command_A[: steps + 2]
+    ]
+    assert set(series.usable_command_A[steps + 2 :]) == {None}
+    assert series.current_A[steps + 2] == series.current_A[steps + 1] < 0.0
+    assert set(series.current_A[steps + 3 :]) == {0.0}
 
 
 def test_without_any_ecu_there_is_no_run(preset):

@@ -13,6 +13,7 @@ from bms.errors import InputError
 from bms.firmware.calibration import load_pair
 from bms.presets import DEFAULT_PRESET
 from hil_sim.database import load_database
+from hil_sim.faults.frames import MessageFault
 from hil_sim.faults.matrix import Expectation, fault_numbers, load_matrix, matrix_path
 from hil_sim.faults.plan import KINDS
 from hil_sim.faults.runner import MatrixSettings, play, play_all
@@ -22,6 +23,7 @@ from tests.hil_sim.command_line import bms
 ROWS = load_matrix()
 SETTINGS = MatrixSettings(*load_pair(DEFAULT_PRESET, None), "virtual:matrix")
 QUICK_PERIODS = 40
+COMMAND = "ChargeCommand"
 RECEIVED = ("CellElectrical", "CellThermal", "Coolant", "ChargeRequest")
 
 
@@ -63,10 +65,16 @@ def test_every_kind_of_fault_has_a_row():
     assert {type(row.fault) for row in ROWS} == set(KINDS)
 
 
-@pytest.mark.parametrize("kind", ["message-lost", "message-delayed", "message-frozen"])
-@pytest.mark.parametrize("message", RECEIVED)
-def test_every_received_message_has_a_row(kind, message):
-    assert any(row.fault.kind == kind and row.fault.message == message for row in ROWS)
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if issubclass(kind, MessageFault)])
+@pytest.mark.parametrize("message", [*RECEIVED, COMMAND])
+def test_every_fault_of_a_message_happens_to_every_message_that_is_acted_on(kind, message):
+    assert any(isinstance(row.fault, kind) and row.fault.message == message for row in ROWS)
+
+
+def test_every_byte_of_the_command_is_corrupted():
+    name = "command corrupted for good"
+    corrupted = {row.fault.byte for row in ROWS if row.name.startswith(name)}
+    assert corrupted == set(range(load_database()[COMMAND].length))
 
 
 @pytest.mark.parametrize("message", RECEIVED)

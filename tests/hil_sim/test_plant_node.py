@@ -6,6 +6,7 @@ import pytest
 from bms.errors import BusError
 from bms.firmware import ReceptionCounts
 from hil_sim.bus import Frame, open_bus
+from hil_sim.database import COUNTER_MODULUS
 from hil_sim.e2e import Sender
 from hil_sim.nodes.plant import CONNECT_ATTEMPTS, PlantNode, Request
 from hil_sim.nodes.turns import LockStep
@@ -116,19 +117,39 @@ def test_a_damaged_command_from_elsewhere_does_not_end_the_answer(database):
             assert wire.exchange().usable_command_A == pytest.approx(-2.0 - period)
 
 
-def test_a_masquerade_with_a_frozen_counter_does_not_end_the_answer(database):
-    """Otherwise commands would come later by a period with each such frame."""
+@pytest.mark.parametrize("every", [1, 3, 4])
+def test_a_masquerade_with_a_frozen_counter_does_not_make_commands_late(database, every):
+    """Where the frozen counter is one of the next three it is obeyed: profile 2 cannot tell."""
     codec = database["ChargeCommand"]
+    frozen = Frame(codec.frame_id, codec.encode({"CommandCurrent": -20.0}, PERIODS_TO_TRUST - 1))
 
     def serve(wire):
-        frozen = codec.encode({"CommandCurrent": -20.0}, PERIODS_TO_TRUST - 1)
-        wire.far.send(Frame(codec.frame_id, frozen))
-        wire.command(-1.0 - len(wire.heard))
+        if len(wire.heard) % every == 0:
+            wire.far.send(frozen)
+        wire.command(-0.1 * len(wire.heard))
 
     with Wire("virtual:masquerade", database, serve) as wire:
         wire.trusted()
-        commands_A = [wire.exchange().usable_command_A for _ in range(4)]
-    assert commands_A == [pytest.approx(-2.0 - period) for period in range(4)]
+        commands_A = [wire.exchange().usable_command_A for _ in range(64)]
+    own = sum(
+        command_A == pytest.approx(-0.1 * period) for period, command_A in enumerate(commands_A, 1)
+    )
+    taken = commands_A.count(pytest.approx(-20.0))
+    assert taken <= 3 * 64 / COUNTER_MODULUS
+    assert own + taken + commands_A.count(None) == 64
+    assert own >= 40
+
+
+def test_an_ecu_that_restarts_is_followed_after_one_wait(database):
+    with Wire("virtual:restart", database, lambda wire: wire.command(-1.0)) as wire:
+        wire.trusted()
+        for _ in range(5):
+            wire.exchange()
+        wire._command = Sender(database["ChargeCommand"])
+        assert wire.exchange().usable_command_A is None
+        for _ in range(4):
+            assert wire.exchange().usable_command_A == pytest.approx(-1.0)
+        assert wire.node.command_counts == ReceptionCounts(0, 0, 0, 8, 0)
 
 
 def test_a_charger_does_not_rely_on_a_command_that_comes_often_damaged(database):
