@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -19,6 +20,9 @@ WORKER = Path(__file__).with_name("socketcan_worker.py")
 INTERFACE = "vcan0"
 KERNEL = "/usr/bin/linux.uml"
 """Of the guest, as in tools/vcan_guest.sh."""
+_LONGEST_START_S = 120.0
+_LONGEST_PERIOD_S = 0.02
+"""Ten times what a control period takes in the guest on an idle machine."""
 
 
 def require_interface() -> None:
@@ -50,7 +54,9 @@ def replay_on_linux(program: Path, recordings: Sequence[Recording]) -> list[list
         asked.write_text(json.dumps(frames), encoding="utf-8")
         worker = [sys.executable, "-S", str(WORKER), str(program.resolve()), INTERFACE]
         command = [str(GUEST), *worker, str(asked), str(said), str(last_id)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        limit_s = _LONGEST_START_S + _LONGEST_PERIOD_S * sum(map(len, frames))
+        environment = {"VCAN_TIMEOUT_S": f"{limit_s:.0f}", **os.environ}
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
         if done.returncode or not said.is_file():
             reason = (done.stderr.splitlines() or [f"exit code {done.returncode}"])[-1]
             raise BusError(f"target 'linux': {reason}")
