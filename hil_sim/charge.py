@@ -9,6 +9,7 @@ from bms.errors import BusError, ModelMismatchError
 from bms.presets import Preset
 from hil_sim.charger import Charger
 from hil_sim.faults import Injection
+from hil_sim.identity import Identity
 from hil_sim.nodes.plant import NO_FAULT, Answer, PlantNode, Request
 from hil_sim.plant import Plant
 from hil_sim.refusal import refusal_text
@@ -31,14 +32,6 @@ SILENT_PERIODS = 5
 """Periods without an intact command that end a run; the charger has stopped well before."""
 
 Progress = Callable[[float], None]
-
-
-@dataclass(frozen=True)
-class Identity:
-    """First digits of the hashes that the ECU reports, as hexadecimal text."""
-
-    model: str
-    preset: str
 
 
 @dataclass
@@ -138,22 +131,25 @@ class Charge:
         fault = answer.value("FirstFault")
         if fault is not None and fault != NO_FAULT:
             self.first_fault = int(fault)
-        model, preset = answer.value("ModelHash"), answer.value("PresetHash")
-        if model is not None and preset is not None:
-            if answer.value("FirmwareVersion") == 0:
-                raise BusError(f"the ECU does not start: {refusal_text(int(model))}")
-            self.identity = Identity(f"{int(model):08x}", f"{int(preset):04x}")
-            if not self.preset.hash.startswith(self.identity.preset):
-                raise ModelMismatchError(
-                    f"the ECU runs a preset with hash {self.identity.preset}..., the plant "
-                    f"'{self.preset.name}' with {self.preset.hash[:4]}...; give both one preset"
-                )
-            if self.model_hash is not None and not self.model_hash.startswith(self.identity.model):
-                raise ModelMismatchError(
-                    f"the ECU runs a model with hash {self.identity.model}..., not "
-                    f"{self.model_hash[:8]}...; build its image with that model, or name with "
-                    "--model the one that it has"
-                )
+        identity = Identity.of(answer.value)
+        if identity is not None:
+            self._check(identity)
+            self.identity = identity
+
+    def _check(self, identity: Identity) -> None:
+        if identity.firmware_version == 0:
+            raise BusError(f"the ECU does not start: {refusal_text(int(identity.model_hash, 16))}")
+        if not self.preset.hash.startswith(identity.preset_hash):
+            raise ModelMismatchError(
+                f"the ECU runs a preset with hash {identity.preset_hash}..., the plant "
+                f"'{self.preset.name}' with {self.preset.hash[:4]}...; give both one preset"
+            )
+        if self.model_hash is not None and not self.model_hash.startswith(identity.model_hash):
+            raise ModelMismatchError(
+                f"the ECU runs a model with hash {identity.model_hash}..., not "
+                f"{self.model_hash[:8]}...; build its image with that model, or name with "
+                "--model the one that it has"
+            )
 
     def _stop_reason(self, answer: Answer) -> str | None:
         if self._edge is None:

@@ -307,7 +307,7 @@ def _sum_up(
         seed=settings.seed,
         disturbance=settings.disturbance.value,
         realtime=settings.realtime,
-        model_hash=charge.identity.model if charge.identity else None,
+        model_hash=charge.identity.model_hash if charge.identity else None,
         preset_hash=settings.preset.hash,
         command_reception=charge.node.command_counts,
         faults=charge.injection.injected,

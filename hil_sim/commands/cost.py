@@ -17,7 +17,7 @@ from hil_sim.commands import options
 from hil_sim.cost import CostReport, measure_cost
 from hil_sim.cost.chart import cost_chart
 from hil_sim.report.folder import OutputFolder
-from hil_sim.targets.catalog import BOARD_NAMES, BUILD, board_name
+from hil_sim.targets.catalog import BOARD_NAMES, board_name, built_folder
 
 
 def cost(
@@ -59,7 +59,8 @@ def cost(
     boards = [board_name(name) for name in target or BOARD_NAMES]
     with OutputFolder(out.parent) if out is not None else nullcontext() as folder:
         reports = [
-            measure_cost(_program(board), board, preset, seed, charges, states) for board in boards
+            measure_cost(built_folder(board) / "cost.elf", board, preset, seed, charges, states)
+            for board in boards
         ]
         if folder is not None and out is not None:
             picture = cost_chart(reports, preset.timing.sampling_period_s)
@@ -74,10 +75,6 @@ def cost(
         typer.echo(f"estimate and decision: {worst} instructions, allowed {limit}", err=True)
         return EXIT_CHECK_FAILED
     return EXIT_DONE
-
-
-def _program(board: str) -> Path:
-    return BUILD / board.replace("-", "_") / "cost.elf"
 
 
 def _print(reports: list[CostReport], charges: int, states: int) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
-from threading import Event
 from typing import Annotated
 
 import typer
@@ -13,6 +11,7 @@ from bms.firmware import Ecu
 from bms.presets import DEFAULT_PRESET
 from hil_sim.bus import open_bus, require_shared
 from hil_sim.clock import WallClock
+from hil_sim.commands.stopping import stop_event
 from hil_sim.nodes.ecu import EcuNode
 from hil_sim.punctuality import Slots, Spread
 
@@ -46,9 +45,7 @@ def ecu(
     """
     require_shared(bus)
     firmware = Ecu(preset=preset, model=model)
-    stop = Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
+    stop = stop_event()
     with open_bus(bus) as connection:
         node = EcuNode(connection, firmware)
         if realtime:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json as json_module
-import signal
 from pathlib import Path
-from threading import Event
 from typing import Annotated
 
 import typer
 
 from bms.errors import InputError
 from hil_sim.commands import options
+from hil_sim.commands.stopping import stop_event
 from hil_sim.targets import Emulation, Flash
 from hil_sim.targets.catalog import BOARD_NAMES, board_name
 
@@ -74,9 +73,7 @@ def flash(
     if not start:
         _print(report, json)
         return 0
-    stop = Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
+    stop = stop_event()
     with Emulation(memory.path, board, port, log) as emulation:
         _print({**report, "bus": emulation.bus}, json)
         while emulation.is_running and not stop.wait(_POLL_S):

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from contextlib import ExitStack
-from threading import Event
 from typing import Annotated
 
 import typer
@@ -14,6 +12,7 @@ from rich.live import Live
 
 from hil_sim.bus import require_shared
 from hil_sim.clock import WallClock
+from hil_sim.commands.stopping import stop_event
 from hil_sim.database import load_database
 from hil_sim.monitor.keyboard import Keyboard
 from hil_sim.monitor.line import status_line
@@ -56,9 +55,7 @@ def monitor(
     finder = preset_finder(preset)
     model = SystemModel(load_database())
     clock = WallClock()
-    stop = Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
+    stop = stop_event()
     start_s = clock.now_s()
     end_s = float("inf") if for_s is None else start_s + for_s
     console = Console()

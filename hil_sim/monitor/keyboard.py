@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import select
 import sys
-from types import TracebackType
 from typing import Any
+
+from hil_sim.closing import Closing
 
 try:
     import termios
@@ -15,24 +16,17 @@ except ImportError:  # Windows; Ctrl-C ends the monitor there.
     termios = None  # type: ignore[assignment]
 
 
-class Keyboard:
+class Keyboard(Closing):
     """Puts the terminal back as it was at the end."""
 
     def __init__(self) -> None:
         self._saved: list[Any] | None = None
-
-    def __enter__(self) -> Keyboard:
         if termios is not None and sys.stdin.isatty():
             self._saved = termios.tcgetattr(sys.stdin)
             tty.setcbreak(sys.stdin)
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Put the terminal back."""
         if self._saved is not None:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._saved)
 

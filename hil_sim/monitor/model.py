@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from codegen import can_database
 from hil_sim.bus import Frame
 from hil_sim.database import MessageCodec, Values
+from hil_sim.identity import Identity
 from hil_sim.monitor.listener import ForeignFrame
 from hil_sim.monitor.traffic import ForeignMeter, ForeignTraffic, MessageMeter, MessageTraffic
 
@@ -35,15 +36,6 @@ class ReceiverReport:
     state: str | None
     counts: tuple[int, ...]
     is_stale: bool
-
-
-@dataclass(frozen=True)
-class Identity:
-    """Which firmware, model and preset the ECU has; hashes as their first hexadecimal digits."""
-
-    firmware_version: int
-    model_hash: str
-    preset_hash: str
 
 
 @dataclass(frozen=True)
@@ -137,7 +129,7 @@ class SystemModel:
                 for number, name in sorted(self._choices["ReportedMessage"].items())
             ),
             foreign=self._foreign.traffic(now_s),
-            identity=_identity(readings),
+            identity=Identity.of(lambda signal: readings[signal].value),
             choices=self._choices,
         )
 
@@ -155,15 +147,6 @@ class SystemModel:
             # The messages take turns in being reported.
             is_stale=now_s - time_s > stale_s * len(self._choices["ReportedMessage"]),
         )
-
-
-def _identity(readings: Mapping[str, Reading]) -> Identity | None:
-    model, preset, version = (
-        readings[signal].value for signal in ("ModelHash", "PresetHash", "FirmwareVersion")
-    )
-    if model is None or preset is None or version is None:
-        return None
-    return Identity(int(version), f"{int(model):08x}", f"{int(preset):04x}")
 
 
 def _whole(value: float | None) -> int:

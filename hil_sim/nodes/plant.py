@@ -173,16 +173,21 @@ class PlantNode:
         A damaged or repeated one of somebody else must not end the answer: it would leave the plant
         a period ahead of the ECU, with commands that are that much older.
         """
-        if frame.frame_id != self._command.frame_id or not self._command.is_intact(frame.data):
-            return False
-        counter = self._command.counter(frame.data)
-        return self._last_counter in (None, (counter - 1) % COUNTER_MODULUS)
+        counter = self._command_counter(frame)
+        return counter is not None and self._last_counter in (None, (counter - 1) % COUNTER_MODULUS)
 
     def _follow(self, frames: list[Frame]) -> None:
         """Also after lost frames and a restart of the ECU, which cost one wait for an answer."""
         for frame in frames:
-            if frame.frame_id == self._command.frame_id and self._command.is_intact(frame.data):
-                self._last_counter = self._command.counter(frame.data)
+            counter = self._command_counter(frame)
+            if counter is not None:
+                self._last_counter = counter
+
+    def _command_counter(self, frame: Frame) -> int | None:
+        """Counter of an intact charge command; None for any other frame."""
+        if frame.frame_id != self._command.frame_id or not self._command.is_intact(frame.data):
+            return None
+        return self._command.counter(frame.data)
 
     def _late_frames(self, period: int) -> list[tuple[float, Frame]]:
         """What came too late for the last period; it must not pass for an answer to this one."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from bms.errors import InputError
 from bms.kan.model_file import KanModel, load_model, shipped_model_path, shipped_models
 from bms.presets import Preset, load_preset, preset_names
+from hil_sim.identity import Identity
 from hil_sim.replay.recording import Recording
 
 IDENTITY = "Identity"
@@ -22,9 +23,11 @@ def choose_pair(
     """
     if preset is not None:
         return preset, model
-    model_hash, preset_hash = recorded_hashes(recording)
-    name = _shipped_preset(recording.path, preset_hash)
-    return name, _shipped_model(recording.path, model_hash, name) if model is None else model
+    recorded = recorded_identity(recording)
+    name = _shipped_preset(recording.path, recorded.preset_hash)
+    if model is None:
+        return name, _shipped_model(recording.path, recorded.model_hash, name)
+    return name, model
 
 
 def identity_to_ignore(recording: Recording, preset: Preset, model: KanModel) -> tuple[int, ...]:
@@ -32,29 +35,33 @@ def identity_to_ignore(recording: Recording, preset: Preset, model: KanModel) ->
 
     Then it differs by intent, and only what follows from that is of interest.
     """
-    try:
-        model_hash, preset_hash = recorded_hashes(recording)
-    except InputError:
-        model_hash = preset_hash = "none"
-    is_same = model.hash.startswith(model_hash) and preset.hash.startswith(preset_hash)
+    recorded = _first_identity(recording)
+    is_same = (
+        recorded is not None
+        and model.hash.startswith(recorded.model_hash)
+        and preset.hash.startswith(recorded.preset_hash)
+    )
     return () if is_same else (recording.database[IDENTITY].frame_id,)
 
 
-def recorded_hashes(recording: Recording) -> tuple[str, str]:
-    """First hexadecimal digits of the model's and the preset's hash; InputError without them."""
-    codec = recording.database[IDENTITY]
-    for answer in recording.answers:
-        for frame in answer:
-            if frame.frame_id == codec.frame_id and (values := codec.decode(frame.data)):
-                return f"{_whole(values['ModelHash']):08x}", f"{_whole(values['PresetHash']):04x}"
+def recorded_identity(recording: Recording) -> Identity:
+    """What the recorded ECU said first that it has; InputError when it never did."""
+    identity = _first_identity(recording)
+    if identity is not None:
+        return identity
     raise InputError(
         f"{recording.path}: no Identity frame is in it, so its ECU was not this firmware; "
         "give --preset to replay it all the same"
     )
 
 
-def _whole(value: float | None) -> int:
-    return int(value or 0)
+def _first_identity(recording: Recording) -> Identity | None:
+    codec = recording.database[IDENTITY]
+    for answer in recording.answers:
+        for frame in answer:
+            if frame.frame_id == codec.frame_id and (values := codec.decode(frame.data)):
+                return Identity.of(values.get)
+    return None
 
 
 def _shipped_preset(path: Path, wanted: str) -> str:

@@ -120,8 +120,13 @@ def find_target(name: str, build: Path = BUILD) -> LinuxTarget | QemuTarget:
     if name == LINUX:
         return LinuxTarget(name, _built(build / LINUX / "bms_ecu", LINUX))
     board = name.removeprefix(QEMU)
-    port = board.replace("-", "_")
-    return QemuTarget(name, board, _built(build / port / "firmware.bin", port))
+    folder = built_folder(board, build)
+    return QemuTarget(name, board, _built(folder / "firmware.bin", folder.name))
+
+
+def built_folder(board: str, build: Path = BUILD) -> Path:
+    """Where `make` builds for a board; its name is that of the port."""
+    return build / board.replace("-", "_")
 
 
 def find_board(name: str, build: Path = BUILD) -> QemuTarget:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable
 from threading import Thread
-from types import TracebackType
+
+from hil_sim.closing import Closing
 
 _PATIENCE_S = 10.0
 
 Answer = Callable[[bytes], bytes]
 
 
-class Line:
+class Line(Closing):
     """Listens on a free port; `answer` gets each line of text and gives the bytes to send back."""
 
     def __init__(self, answer: Answer) -> None:
@@ -21,6 +22,7 @@ class Line:
         self.bus = f"slcan:socket://127.0.0.1:{self._listener.getsockname()[1]}"
         self.chunks: list[bytes] = []
         self._thread = Thread(target=self._serve, daemon=True)
+        self._thread.start()
 
     def _serve(self) -> None:
         self._listener.settimeout(_PATIENCE_S)
@@ -36,16 +38,8 @@ class Line:
                     return
                 connection.sendall(said)
 
-    def __enter__(self) -> Line:
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Wait until the other end has hung up."""
         self._thread.join(_PATIENCE_S)
         self._listener.close()
 
