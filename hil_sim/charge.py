@@ -54,6 +54,7 @@ class Charge:
         self.series = TimeSeries()
         self.steps = 0
         self.identity: Identity | None = None
+        self._heard_identity: Identity | None = None
         self.error_bound_K: float | None = None
         self.first_fault: int | None = None
         self._edge: int | None = None
@@ -133,8 +134,11 @@ class Charge:
             self.first_fault = int(fault)
         identity = Identity.of(answer.value)
         if identity is not None:
-            self._check(identity)
-            self.identity = identity
+            # The message is not protected: one that contradicts the first has to come twice.
+            if self.identity is None or identity in (self.identity, self._heard_identity):
+                self._check(identity)
+                self.identity = identity
+            self._heard_identity = identity
 
     def _check(self, identity: Identity) -> None:
         if identity.firmware_version == 0:

@@ -47,6 +47,26 @@ class OftenDamaged:
         return [*others, *damaged, (command_id, data)]
 
 
+class Contradicting:
+    """The firmware, some of whose Identity messages after its first have other hashes."""
+
+    def __init__(self, preset, times):
+        self._ecu = Ecu(preset=preset)
+        self.receive, self.step = self._ecu.receive, self._ecu.step
+        self._sent = 0
+        self._times = times
+
+    def transmit(self):
+        return [
+            (frame_id, self._changed(frame_id, data)) for frame_id, data in self._ecu.transmit()
+        ]
+
+    def _changed(self, frame_id, data):
+        self._sent += frame_id == IDENTITY_ID
+        is_changed = frame_id == IDENTITY_ID and 1 < self._sent <= 1 + self._times
+        return bytes(byte ^ 0xFF for byte in data) if is_changed else data
+
+
 class HotterThanAllowed:
     """The firmware with temperature limits that are too high by some kelvin, and no identity."""
 

@@ -11,7 +11,7 @@ from bms.presets import load_preset
 from hil_sim.disturbances import DisturbanceKind
 from hil_sim.recorder import Recorder
 from hil_sim.session import ControllerKind, Settings, run_both
-from tests.hil_sim.ecus import HotterThanAllowed, OftenDamaged, SilentAfter
+from tests.hil_sim.ecus import Contradicting, HotterThanAllowed, OftenDamaged, SilentAfter
 
 SHORT_S = 20.0
 
@@ -127,6 +127,27 @@ def test_the_charger_stops_when_commands_come_often_damaged(preset):
     assert set(series.usable_command_A[steps + 2 :]) == {None}
     assert series.current_A[steps + 2] == series.current_A[steps + 1] < 0.0
     assert set(series.current_A[steps + 3 :]) == {0.0}
+
+
+def test_one_identity_of_somebody_else_does_not_end_the_run(preset):
+    """The message is not protected, so that any 8 bytes under its identifier are one."""
+    result = run_both(
+        Settings(preset, max_time_s=SHORT_S),
+        ecu_factory=lambda plant, database: Contradicting(preset, times=1),
+    )
+    assert result.summary.stop_reason == "time-limit"
+    assert preset.hash.startswith(result.summary.preset_hash)
+    assert (
+        result.summary.model_hash == run_both(Settings(preset, max_time_s=1.0)).summary.model_hash
+    )
+
+
+def test_an_ecu_that_says_twice_that_it_is_another_one_ends_the_run(preset):
+    with pytest.raises(ModelMismatchError, match="the ECU runs a preset with hash"):
+        run_both(
+            Settings(preset, max_time_s=SHORT_S),
+            ecu_factory=lambda plant, database: Contradicting(preset, times=2),
+        )
 
 
 def test_without_any_ecu_there_is_no_run(preset):
