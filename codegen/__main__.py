@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from bms.kan.model_file import load_shipped_model
+from bms.model.model_file import load_shipped_model
 from bms.presets import DEFAULT_PRESET, load_preset
 from codegen.calibration_source import calibration_source
 from codegen.can_document import can_document

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from bms.kan.model_file import KanModel
+from bms.calibration import calibration_fields
+from bms.model.model_file import KanModel
 from bms.presets import Preset
-from bms.tables import calibration_fields, network_tables
+from bms.tables import network_tables
 from codegen.rendering import environment, initialiser
 
 FILE_NAME = "calibration_default.c"

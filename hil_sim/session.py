@@ -15,7 +15,7 @@ import numpy as np
 from bms.baselines import BASELINES
 from bms.errors import InputError
 from bms.firmware import Ecu
-from bms.kan.model_file import KanModel
+from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.presets.schema import Initial
 from hil_sim.bus import CanBus, is_line, open_bus, require_room_for_ecu, require_shared

@@ -23,7 +23,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--firmware-build",
         type=Path,
-        help="folder of a variant made by 'python -m bms.firmware.build', used instead",
+        help="folder of a variant made by 'python -m bms.native_build', used instead",
     )
 
 

@@ -12,14 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from bms.arrays import Array
 from bms.barrier.margins import BusQuantisation
 from bms.cell import CellParameters
 from bms.errors import InputError
 from bms.presets.schema import Preset
 
-Array = npt.NDArray[np.float64]
 _BUS = BusQuantisation()
 
 

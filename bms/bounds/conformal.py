@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from bms.arrays import Array
 from bms.bounds.record import Conformal
 from bms.errors import InputError
-from bms.kan.basis import Array
 
 CONFIDENCE = 0.95
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bms.kan.basis import Array
+from bms.arrays import Array
 from bms.kan.descent import jacobian
 from bms.kan.grid import solve_last_layer
 from bms.kan.loss import parameters, with_parameters

@@ -15,11 +15,12 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from bms.arrays import Array
 from bms.bounds.fitting import Layers, Points, fitted
 from bms.bounds.rate import fit_rate
 from bms.bounds.record import TheoremBound
 from bms.data.simulate import Samples
-from bms.kan.basis import Array, basis, uniform_knots
+from bms.kan.basis import basis, uniform_knots
 from bms.kan.network import Network
 from bms.kan.trainable import TrainableLayer, forward
 

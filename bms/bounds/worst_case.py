@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import differential_evolution
 
+from bms.arrays import Array
 from bms.bounds.record import WorstCase, WorstProfile
 from bms.data.profiles import (
     CORE_LIMIT_BELOW_BOX_K,
@@ -24,7 +25,6 @@ from bms.data.profiles import (
     start_range_K,
 )
 from bms.data.simulate import Samples, simulate
-from bms.kan.basis import Array
 from bms.kan.network import Network
 from bms.presets import Preset
 

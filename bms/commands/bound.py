@@ -24,10 +24,10 @@ from bms.data.measurements import read_measurements
 from bms.data.simulate import joined
 from bms.errors import InputError
 from bms.files import write_text
-from bms.kan.build import split_by_time
-from bms.kan.model_file import KanModel, load_model
+from bms.model.make import split_by_time
+from bms.model.model_file import KanModel, load_model
+from bms.model.pair import check_pair
 from bms.presets import load_preset
-from bms.tables.calibration_block import check_pair
 
 LARGE_ENOUGH, TOO_SMALL = 0, 1
 _ROUND_OFF = 1e-9

@@ -18,12 +18,12 @@ from rich.table import Table
 from bms.commands.options import DataOption
 from bms.errors import InputError
 from bms.files import write_text
-from bms.kan.model_file import load_model, load_shipped_model, shipped_model_path
 from bms.kan.network import INPUT_NAMES
+from bms.model.model_file import load_model, load_shipped_model, shipped_model_path
 from bms.presets import Preset, load_preset
 
 if TYPE_CHECKING:
-    from bms.rivals.comparison import Comparison, NamedModel, Row
+    from bms.studies.rivals.comparison import Comparison, NamedModel, Row
 
 DEFAULT_CELL = "lin2014"
 _TABLE_WIDTH = 140
@@ -70,11 +70,11 @@ def compare_estimators(
     Example: bms compare-estimators --preset paper_calibrated --out out/estimators
     """
     # Imported here, so that the other commands start where the firmware is not compiled.
-    from bms.rivals.chart import save_chart  # noqa: PLC0415
-    from bms.rivals.comparison import compare  # noqa: PLC0415
-    from bms.rivals.effort import FULL, QUICK  # noqa: PLC0415
-    from bms.rivals.lagged import all_lags  # noqa: PLC0415
-    from bms.rivals.verdict import verdict  # noqa: PLC0415
+    from bms.studies.rivals.chart import save_chart  # noqa: PLC0415
+    from bms.studies.rivals.comparison import compare  # noqa: PLC0415
+    from bms.studies.rivals.effort import FULL, QUICK  # noqa: PLC0415
+    from bms.studies.rivals.lagged import all_lags  # noqa: PLC0415
+    from bms.studies.rivals.verdict import verdict  # noqa: PLC0415
 
     if (preset is None) == (data is None):
         raise InputError("compare-estimators: give either --preset NAME or --data CSV")
@@ -93,11 +93,11 @@ def compare_estimators(
     if out is not None:
         _make_folder(out)
     if data is not None:
-        from bms.rivals.recorded import recorded_problem  # noqa: PLC0415
+        from bms.studies.rivals.recorded import recorded_problem  # noqa: PLC0415
 
         problem = recorded_problem(data, chosen, cell is None, lags)
     else:
-        from bms.rivals.simulated import simulated_problem  # noqa: PLC0415
+        from bms.studies.rivals.simulated import simulated_problem  # noqa: PLC0415
 
         problem = simulated_problem(chosen, used_seed, lags, profiles)
     comparison = compare(problem, models, used_seed, time.perf_counter_ns, QUICK if quick else FULL)
@@ -125,7 +125,7 @@ def compare_estimators(
 
 def _models(preset: Preset | None, paths: list[Path]) -> list[NamedModel]:
     """The preset's own network first, then those of the files, which can do without it."""
-    from bms.rivals.comparison import NamedModel  # noqa: PLC0415
+    from bms.studies.rivals.comparison import NamedModel  # noqa: PLC0415
 
     models = []
     if preset is not None and (shipped_model_path(preset.name).is_file() or not paths):

@@ -14,16 +14,16 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from bms.arrays import Array, Mask
 from bms.commands.options import DataOption
 from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
 from bms.data.simulate import Samples, joined
 from bms.errors import InputError
 from bms.kan.accuracy import error_figures
-from bms.kan.basis import Array, Mask
-from bms.kan.model_file import KanModel, load_model
+from bms.model.model_file import KanModel, load_model
+from bms.model.pair import check_pair
 from bms.presets import load_preset
-from bms.tables.calibration_block import check_pair
 
 
 class Engine(str, Enum):

@@ -11,15 +11,15 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from bms.arrays import Array
 from bms.commands.options import DataOption
 from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
 from bms.data.simulate import joined
 from bms.errors import InputError
 from bms.files import write_text
-from bms.kan.basis import Array
-from bms.kan.model_file import KanModel, load_model
 from bms.kan.network import INPUT_NAMES
+from bms.model.model_file import KanModel, load_model
 from bms.presets import load_preset
 
 _PROFILES = 30
@@ -45,10 +45,10 @@ def explain(
     Example: bms explain --model model.json --out out/explain
     """
     # Imported here, so that the other commands start without Matplotlib's seconds.
-    from bms.explanation import explain as explained  # noqa: PLC0415
-    from bms.explanation.plots import layer_figure, sensitivity_figure  # noqa: PLC0415
-    from bms.explanation.report import Subject, as_latex, as_text  # noqa: PLC0415
-    from bms.explanation.report import as_json as as_content  # noqa: PLC0415
+    from bms.studies.explanation import explain as explained  # noqa: PLC0415
+    from bms.studies.explanation.plots import layer_figure, sensitivity_figure  # noqa: PLC0415
+    from bms.studies.explanation.report import Subject, as_latex, as_text  # noqa: PLC0415
+    from bms.studies.explanation.report import as_json as as_content  # noqa: PLC0415
 
     loaded = load_model(model)
     inputs, source = _inputs(loaded, data, preset)

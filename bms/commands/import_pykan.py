@@ -15,8 +15,8 @@ from rich.table import Table
 
 from bms.commands.options import DataOption
 from bms.errors import InputError
-from bms.kan.model_file import KanModel, save_model
 from bms.kan.network import INPUT_NAMES
+from bms.model.model_file import KanModel, save_model
 from bms.presets import DEFAULT_PRESET, Preset, load_preset
 from bms.tables import network_tables
 

@@ -14,10 +14,10 @@ from rich.table import Table
 
 from bms.commands.options import DataOption
 from bms.errors import InputError
-from bms.kan.build import model_for_measurements, model_for_preset
-from bms.kan.model_file import KanModel, save_model
 from bms.kan.network import INPUT_NAMES
 from bms.kan.settings import TrainingSettings
+from bms.model.make import model_for_measurements, model_for_preset
+from bms.model.model_file import KanModel, save_model
 from bms.presets import load_preset
 from bms.validation import parse
 

@@ -42,7 +42,7 @@ def verify(
     Example: bms verify --preset lin2014 --json
     """
     # Imported here, so that the other commands start where the firmware is not compiled.
-    from bms.firmware.calibration import load_pair  # noqa: PLC0415
+    from bms.model.pair import load_pair  # noqa: PLC0415
     from bms.verification.closed_loop import slip_cost  # noqa: PLC0415
     from bms.verification.verify import verify as certify  # noqa: PLC0415
 

@@ -13,7 +13,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from bms.errors import InputError
-from bms.kan.model_file import KanModel, load_model, shipped_models
+from bms.model.model_file import KanModel, load_model, shipped_models
 
 HELD, BROKEN = 0, 1
 _STRIDE = 8191
@@ -42,7 +42,7 @@ def verify_tables(
     Example: bms verify-tables --model model.json --stride 1
     """
     # Imported here, so that the other commands start where the firmware is not compiled.
-    from bms.tables.exhaustive import EdgeCheck, check_network  # noqa: PLC0415
+    from bms.verification.exhaustive import EdgeCheck, check_network  # noqa: PLC0415
 
     paths = list(model) if model else shipped_models()
     models = {str(path): _bounded(load_model(path), path) for path in paths}

@@ -6,9 +6,9 @@ from typing import Literal
 
 import numpy as np
 
+from bms.data.lags import Lags
 from bms.data.profiles import KINDS, Kind, draw_profiles
 from bms.data.simulate import Samples, simulate
-from bms.kan.lags import Lags
 from bms.presets import Preset
 
 Split = Literal["training", "validation", "test", "evaluation"]

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from bms.data.profiles import Array
+from bms.arrays import Array
+from bms.data.lags import Lags, at_rest, step
 from bms.data.simulate import Samples
 from bms.errors import InputError
-from bms.kan.lags import Lags, at_rest, step
 from bms.validation import read_text
 
 

@@ -15,11 +15,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from bms.arrays import Array
 from bms.presets import Preset
 
-Array = npt.NDArray[np.float64]
 Kind = Literal["constant", "dynamic", "steps"]
 KINDS: tuple[Kind, ...] = ("constant", "dynamic")
 """Kinds that networks are trained and tested on."""

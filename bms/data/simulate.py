@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from bms.arrays import Array
 from bms.cell import CellParameters, CellState, Disturbance, integrate_step
-from bms.data.profiles import SAMPLE_PERIOD_S, Array, Profiles
-from bms.kan.lags import Lags, at_rest, step
+from bms.data.lags import Lags, at_rest, step
+from bms.data.profiles import SAMPLE_PERIOD_S, Profiles
 from bms.presets import Preset
 
 PROCESS_NOISE_K_PER_S = 5e-4

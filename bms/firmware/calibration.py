@@ -3,24 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
+from bms.calibration import NO_CHANGES, calibration_fields
 from bms.errors import InputError, ModelMismatchError
 from bms.firmware._firmware import ffi, lib
-from bms.kan.model_file import KanModel, load_model, load_shipped_model
+from bms.model.model_file import KanModel
 from bms.presets import DEFAULT_PRESET, Preset, load_preset
-from bms.tables import NO_CHANGES, calibration_fields
-
-
-def load_pair(
-    preset: str | Path | Preset, model: str | Path | KanModel | None
-) -> tuple[Preset, KanModel]:
-    """Preset and model by name, path or object; without a model the one that ships with it."""
-    chosen = preset if isinstance(preset, Preset) else load_preset(preset)
-    if isinstance(model, KanModel):
-        return chosen, model
-    return chosen, load_shipped_model(chosen.name) if model is None else load_model(Path(model))
 
 
 def calibration_block(

@@ -14,9 +14,10 @@ from bms.barrier import sampling_margins
 from bms.data.simulate import Samples
 from bms.decision import ACTIVE_CONSTRAINTS, ConstraintMargins, Decision
 from bms.firmware._firmware import ffi, lib
-from bms.firmware.calibration import calibration_block, load_pair
-from bms.kan.model_file import KanModel
+from bms.firmware.calibration import calibration_block
 from bms.kan.network import INPUT_NAMES
+from bms.model.model_file import KanModel
+from bms.model.pair import load_pair
 from bms.presets import Preset
 from bms.tables import network_tables
 

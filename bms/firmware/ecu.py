@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from bms.calibration import NO_CHANGES
 from bms.firmware._firmware import ffi, lib
-from bms.firmware.calibration import calibration_block, load_pair
-from bms.kan.model_file import KanModel
+from bms.firmware.calibration import calibration_block
+from bms.model.model_file import KanModel
+from bms.model.pair import load_pair
 from bms.presets import Preset
-from bms.tables import NO_CHANGES
 
 MAX_DATA_LENGTH = 8
 

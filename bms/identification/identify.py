@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
+from bms.arrays import Array
 from bms.cell import CellParameters
 from bms.data.measurements import Measurements
-from bms.data.profiles import Array
 from bms.errors import InputError
 from bms.identification.trajectory import thermal_trajectory
 from bms.identification.uncertainty import correlation, covariance

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from bms.arrays import Array
 from bms.cell import CellParameters
 from bms.data.measurements import Measurements
-from bms.data.profiles import Array
 
 
 def thermal_trajectory(cell: CellParameters, recording: Measurements) -> tuple[Array, Array]:

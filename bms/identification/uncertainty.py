@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bms.data.profiles import Array
+from bms.arrays import Array
 
 _BLOCKS = 24
 _SMALLEST_SINGULAR_VALUE = 1e-12

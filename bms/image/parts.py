@@ -7,7 +7,7 @@ from bms.firmware.calibration import calibration_block
 from bms.image.header import CALIBRATION, HEADER_LENGTH, Header
 from bms.image.memory_map import ERASED, MEMORY_MAP
 from bms.image.seal import sealed_part
-from bms.kan.model_file import KanModel
+from bms.model.model_file import KanModel
 from bms.presets import Preset
 
 

@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
+from typing import Annotated
 
+import numpy as np
+from annotated_types import Ge
+
+from bms.arrays import Array
 from bms.barrier.margins import BusQuantisation
-from bms.kan.basis import Array
-from bms.kan.model_file import ErrorFigures
 from bms.kan.network import INPUT_NAMES, Network
 from bms.presets.schema import Sensors
+from bms.validation import Finite, NonNegative, strict
+
+
+@strict
+@dataclass(frozen=True)
+class ErrorFigures:
+    """Error of the estimate (estimate - truth) over some samples."""
+
+    rmse_K: NonNegative
+    max_abs_error_K: NonNegative
+    bias_K: Finite
+    samples: Annotated[int, Ge(1)]
 
 
 def error_figures(estimate_K: Array, truth_K: Array) -> ErrorFigures:

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
-from bms.kan.basis import Array, basis, extended_knots
+from bms.arrays import Array
+from bms.kan.basis import basis, extended_knots
 from bms.kan.grid import blended_grid, hidden_span
 from bms.kan.settings import TrainingSettings
 from bms.kan.trainable import TrainableLayer, activations, expand, forward

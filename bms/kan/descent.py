@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize
 
-from bms.kan.basis import Array
+from bms.arrays import Array
 from bms.kan.loss import Loss, parameters, with_parameters
 from bms.kan.trainable import TrainableLayer, activation_slopes, activations, expand, splines
 

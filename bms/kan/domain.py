@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from bms.arrays import Array
 from bms.errors import InputError
 from bms.validation import Finite, strict
 
-Array = npt.NDArray[np.float64]
 _MARGIN = 0.3
 _LEAST_MARGIN = 0.15
 _LEAST_RANGE = 0.5

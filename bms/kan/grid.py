@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bms.kan.basis import Array, basis, extended_knots, silu
+from bms.arrays import Array
+from bms.kan.basis import basis, extended_knots, silu
 from bms.kan.trainable import TrainableLayer, expand, forward, splines
 
 _UNIFORM_SHARE = 0.02

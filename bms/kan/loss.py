@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bms.kan.basis import Array
+from bms.arrays import Array
 from bms.kan.trainable import Expansion, TrainableLayer, activations, backward, expand
 
 _TINY = 1e-300

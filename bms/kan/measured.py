@@ -11,9 +11,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from bms.arrays import Array
 from bms.data.simulate import Samples
 from bms.kan.additive import additive_layers
-from bms.kan.basis import Array
 from bms.kan.domain import domain_of
 from bms.kan.network import Network
 from bms.kan.scaling import Ranges, Scaling

@@ -8,10 +8,11 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Ge
 
+from bms.arrays import Array, Mask
+from bms.data.lags import Lags
 from bms.errors import InputError
-from bms.kan.basis import Array, Mask, basis, silu
+from bms.kan.basis import basis, silu
 from bms.kan.domain import EVERYWHERE, Domain
-from bms.kan.lags import Lags
 from bms.validation import Finite, Positive, strict
 
 INPUT_NAMES = (

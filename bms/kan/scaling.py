@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bms.arrays import Array
 from bms.data.simulate import Samples
 from bms.errors import InputError
-from bms.kan.basis import Array
 from bms.kan.domain import Domain
 from bms.kan.network import INPUT_NAMES, Network
 from bms.kan.settings import TrainingSettings

@@ -7,8 +7,8 @@ from typing import Annotated
 
 from annotated_types import Ge, MinLen
 
+from bms.data.lags import Lag, Lags
 from bms.errors import InputError
-from bms.kan.lags import Lag, Lags
 from bms.validation import NonNegative, Positive, strict
 
 Count = Annotated[int, Ge(1)]

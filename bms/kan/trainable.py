@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bms.kan.basis import Array, basis_with_slope, silu, silu_slope
+from bms.arrays import Array
+from bms.kan.basis import basis_with_slope, silu, silu_slope
 from bms.kan.network import Edge, Layer
 
 

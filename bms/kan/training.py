@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from bms.arrays import Array
 from bms.data.simulate import Samples
 from bms.kan.additive import additive_layers
-from bms.kan.basis import Array, uniform_knots
+from bms.kan.basis import uniform_knots
 from bms.kan.descent import descend, gauss_newton_directions
 from bms.kan.domain import domain_of
 from bms.kan.grid import follow_data, solve_last_layer

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from bms.arrays import Array
 from bms.errors import InputError
-from bms.kan.basis import Array
 from bms.validation import read_text
 
 _PARTS = ("_config.yml", "_state", "_cache_data")

@@ -10,16 +10,11 @@ from bms.bounds.record import ErrorBounds
 from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
 from bms.data.simulate import Samples, joined
-from bms.kan.accuracy import error_figures
-from bms.kan.build import finished_model
-from bms.kan.model_file import (
-    ErrorFigures,
-    KanModel,
-    SplitErrors,
-    TrainingRecord,
-)
+from bms.kan.accuracy import ErrorFigures, error_figures
 from bms.kan.network import INPUT_NAMES, Network
 from bms.kan.settings import TrainingSettings
+from bms.model.make import finished_model
+from bms.model.model_file import KanModel, SplitErrors, TrainingRecord
 from bms.presets import Preset
 from bms.pykan_import.checkpoint import Checkpoint
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from bms.arrays import Array
 from bms.errors import InputError
-from bms.kan.basis import Array
 from bms.kan.network import INPUT_NAMES, Edge, Layer, Network
 from bms.kan.scaling import Scaling
 from bms.pykan_import.checkpoint import Checkpoint, CheckpointLayer

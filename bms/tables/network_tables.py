@@ -13,14 +13,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from numpy.polynomial import Chebyshev, Polynomial
 
+from bms.arrays import Array
+from bms.data.lags import QUANTITIES, Lags, settling_time_s
 from bms.errors import InputError
-from bms.kan.lags import QUANTITIES, Lags, settling_time_s
 from bms.kan.network import Edge, Network
-
-Array = npt.NDArray[np.float64]
 
 MAX_LAYERS, MAX_WIDTH, MAX_KNOTS, MAX_COEFFICIENTS = 3, 8, 128, 512
 MAX_LAGS, MAX_DIRECTIONS = 4, 8

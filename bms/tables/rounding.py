@@ -13,11 +13,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from bms.arrays import Array
 from bms.barrier.rounding import UNIT
+from bms.data.lags import Lag
 from bms.errors import InputError
-from bms.kan.lags import Lag
 from bms.kan.network import INPUT_NAMES, Network
-from bms.tables.network_tables import Array, EdgeTable, NetworkTables, network_tables
+from bms.tables.network_tables import EdgeTable, NetworkTables, network_tables
 
 PERIOD_S = 0.1
 """Control period for which the rounding of the filters of lagged inputs is bounded."""

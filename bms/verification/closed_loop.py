@@ -17,7 +17,7 @@ import numpy as np
 from bms.barrier import BusQuantisation
 from bms.barrier.margins import soc_error_bound
 from bms.cell import CellState, Disturbance, integrate_step, terminal_voltage_V
-from bms.kan.model_file import KanModel
+from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.verification.conditions import firmware_constants, reading_errors
 from bms.verification.decision import decide

@@ -14,7 +14,7 @@ from typing import Any
 from bms.barrier import BusQuantisation, barrier_constants
 from bms.barrier.machinery import check_gains
 from bms.firmware.calibration import calibration_block
-from bms.kan.model_file import KanModel
+from bms.model.model_file import KanModel
 from bms.presets import Preset
 
 

@@ -12,16 +12,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
+from bms.arrays import Array
 from bms.cell import CellParameters, CellState
 from bms.verification.conditions import Condition
 from bms.verification.domain import Domain
 from bms.verification.search import simulate_hold
 
-Array = npt.NDArray[np.float64]
 HORIZONS_S = (1.0, 10.0, 60.0)
 
 

@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Union
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
 Operand = Union["Interval", float]
 
 

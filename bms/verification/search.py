@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from bms.arrays import Array
 from bms.barrier import BusQuantisation
 from bms.barrier.margins import soc_error_bound
 from bms.cell import CellState, Disturbance, integrate_step, terminal_voltage_V
@@ -16,7 +16,6 @@ from bms.verification.conditions import Condition, ReadingErrors, decided_condit
 from bms.verification.decision import decide
 from bms.verification.domain import Domain, weights
 
-Array = npt.NDArray[np.float64]
 SAMPLES = 200_000
 SUB_STEPS = 40
 LEAST_VIOLATION = 1e-9

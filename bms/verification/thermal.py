@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bms.arrays import Array
 from bms.verification.conditions import Condition, ErrorTerm, ReadingErrors
 from bms.verification.domain import Domain, Point, Rates, weights
 from bms.verification.intervals import Interval
 
-Array = npt.NDArray[np.float64]
 LARGEST_BATCH = 20_000
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bms.barrier.rounding import rounding_allowances
-from bms.kan.model_file import KanModel
+from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.verification.conditions import (
     chains,

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from bms.image import calibration_part
-from bms.kan.model_file import load_model, load_shipped_model
+from bms.model.model_file import load_model, load_shipped_model
 from bms.presets import DEFAULT_PRESET, load_preset
 from codegen.calibration_source import calibration_source
 from codegen.can_sources import can_sources

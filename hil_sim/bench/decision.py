@@ -15,9 +15,9 @@ from bms.firmware._firmware import ffi, lib
 from scipy.optimize import minimize
 from scipy.sparse import csc_matrix
 
+from bms.arrays import Array
 from bms.firmware.calibration import calibration_block
 from bms.firmware.controller import write_decision_input
-from bms.kan.basis import Array
 from hil_sim.bench.estimate import FEW, SOME
 from hil_sim.bench.machine import THIS_PROJECT, package
 from hil_sim.bench.problem import Problem

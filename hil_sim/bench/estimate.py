@@ -8,8 +8,8 @@ import numpy as np
 from bms.firmware._firmware import ffi, lib
 from scipy.interpolate import BSpline
 
+from bms.arrays import Array
 from bms.firmware.calibration import calibration_block
-from bms.kan.basis import Array
 from bms.kan.network import INPUT_NAMES, Edge, Network
 from hil_sim.bench.machine import THIS_PROJECT, package
 from hil_sim.bench.problem import Problem

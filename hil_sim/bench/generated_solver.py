@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from cffi import FFI
 
-from bms.firmware.build import FLAGS
-from bms.kan.basis import Array
+from bms.arrays import Array
+from bms.native_build import FLAGS
 from hil_sim.bench.decision import SOLVER_PRECISION, SOLVER_TOLERANCE_A
 from hil_sim.bench.machine import package
 from hil_sim.bench.problem import Problem

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from bms.firmware._firmware import ffi, lib
 
+from bms.arrays import Array
 from bms.firmware.calibration import calibration_block
-from bms.kan.basis import Array
 from hil_sim.bench.machine import THIS_PROJECT
 from hil_sim.bench.problem import Problem
 from hil_sim.bench.race import Peer

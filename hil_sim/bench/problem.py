@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from bms.arrays import Array
 from bms.barrier import barrier_constants, sampling_margins
 from bms.barrier.constraints import current_interval_A, left_hand_sides, thermal_sides
 from bms.cell import CellState
 from bms.firmware import Firmware
-from bms.kan.basis import Array
 from hil_sim.bench.race import Rows
 from hil_sim.bus import Frame
 from hil_sim.disturbances import DisturbanceKind

@@ -9,8 +9,8 @@ from statistics import median
 import numpy as np
 import numpy.typing as npt
 
+from bms.arrays import Array
 from bms.errors import BmsError
-from bms.kan.basis import Array
 
 ClockNs = Callable[[], int]
 """Nanoseconds since any moment; it must not run backwards."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from bms.firmware.calibration import load_pair
+from bms.model.pair import load_pair
 from hil_sim.bench.race import ClockNs
 from hil_sim.campaign.executors import local_workforce
 from hil_sim.campaign.run import run_campaign

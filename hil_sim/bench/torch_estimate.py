@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from bms.kan.basis import Array
-from bms.rivals.kan import trained_parameters
-from bms.rivals.perceptron import Perceptron, hidden_nodes
+from bms.arrays import Array
+from bms.studies.rivals.kan import trained_parameters
+from bms.studies.rivals.perceptron import Perceptron, hidden_nodes
 from hil_sim.bench.estimate import FEW, TOLERANCE_K, normalised
 from hil_sim.bench.machine import package
 from hil_sim.bench.problem import Problem
@@ -55,7 +55,7 @@ def torch_perceptron(problem: Problem) -> TorchPerceptron:
     """A perceptron with one hidden layer and at least as many parameters as the network.
 
     Its weights are drawn, because time does not depend on them; its answers have to be those of the
-    same weights in bms.rivals.
+    same weights in bms.studies.rivals.
     """
     torch.set_num_threads(1)
     nodes = hidden_nodes(trained_parameters(problem.firmware.model.network))

@@ -8,8 +8,8 @@ from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bms.arrays import Array
 from bms.barrier.rates import heat_range_W
 from bms.cell import CellParameters
 from bms.presets import Preset
@@ -34,8 +34,6 @@ COLDEST_ABOVE_BOX_K, HOTTEST_BELOW_LIMIT_K = 2.0, 8.0
 
 _KINDS = (DisturbanceKind.GAUSSIAN, DisturbanceKind.BANG_BANG, DisturbanceKind.UPWARD)
 _SAFETY_FACTOR = 0.9
-
-Array = npt.NDArray[np.float64]
 
 
 class Family(str, Enum):

@@ -6,22 +6,20 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from bms.arrays import Array
 from bms.barrier import barrier_constants
 from bms.baselines.cc_cv import CUT_BACK_SPAN_K
 from bms.baselines.measured_cell import charging_voltage_V
+from bms.calibration import calibration_fields
 from bms.cell import CellParameters, CellState
 from bms.presets import Preset
 from bms.presets.schema import Sensor
-from bms.tables import calibration_fields
 from codegen.can_database import load_database
 from hil_sim.campaign._runner import ffi, lib
 from hil_sim.campaign.settings import CampaignSettings
 from hil_sim.charge import OFF_PERIODS, READY_PERIODS, STARTING_PERIODS
 from hil_sim.sensors import Readings
-
-Array = npt.NDArray[np.float64]
 
 SUB_STEPS: int = lib.CHARGE_SUB_STEPS
 CONTROLLERS = {

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from bms.arrays import Array
 from hil_sim.campaign.engine import CONTROLLERS
 from hil_sim.campaign.settings import CampaignSettings
-from hil_sim.campaign.summary import CLASSES, Array, Rows, column, limits
+from hil_sim.campaign.summary import CLASSES, Rows, column, limits
 from hil_sim.campaign.worker import prefix
 from hil_sim.report.chart import CONTROLLER_COLOURS, LIMIT_COLOUR
 

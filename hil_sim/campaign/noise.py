@@ -7,12 +7,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bms.arrays import Array
 from bms.presets.schema import Uncertainty
 from hil_sim.disturbances import LONGEST_DWELL_S, SHORTEST_DWELL_S, DisturbanceKind
 
-Array = npt.NDArray[np.float64]
 _CHANNELS = 4
 _EVENTS_IN_RESERVE = 100
 

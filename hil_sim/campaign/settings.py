@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bms.errors import InputError
-from bms.kan.model_file import KanModel
+from bms.model.model_file import KanModel
 from bms.presets import Preset
 
 CHUNK_RUNS = 20

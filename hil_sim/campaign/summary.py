@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import binomtest
 
+from bms.arrays import Array
 from hil_sim.campaign.engine import CONTROLLERS
 from hil_sim.campaign.settings import CampaignSettings
 from hil_sim.campaign.worker import FIRMWARE, prefix
@@ -20,7 +21,6 @@ CLASSES = ("inside", "outside")
 _QUANTILES = {"min": 0.0, "p5": 0.05, "median": 0.5, "p95": 0.95, "max": 1.0}
 
 Rows = list[dict[str, str]]
-Array = npt.NDArray[np.float64]
 
 
 def limits(settings: CampaignSettings) -> dict[str, tuple[str, float]]:

@@ -17,7 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
-from bms.firmware.calibration import load_pair
+from bms.model.pair import load_pair
 from hil_sim.campaign.executors import Workforce, dask_workforce, local_workforce
 from hil_sim.campaign.histogram import save_histograms
 from hil_sim.campaign.run import run_campaign

@@ -17,7 +17,7 @@ from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.errors import InputError
-from bms.firmware.calibration import load_pair
+from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
 from hil_sim.commands import options
 from hil_sim.commands.fault_matrix import chosen_rows

@@ -20,7 +20,7 @@ from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.errors import InputError
-from bms.firmware.calibration import load_pair
+from bms.model.pair import load_pair
 from hil_sim.commands import options
 from hil_sim.faults.matrix import Row, load_matrix
 from hil_sim.faults.report import (

@@ -49,7 +49,7 @@ def replay(
         tuple[Path, Path] | None,
         typer.Option(
             "--against",
-            help="Compare two builds made by 'python -m bms.firmware.build' on a folder of logs.",
+            help="Compare two builds made by 'python -m bms.native_build' on a folder of logs.",
         ),
     ] = None,
     json: JsonOption = False,

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from bms.errors import InputError
-from bms.firmware.calibration import load_pair
+from bms.model.pair import load_pair
 from bms.presets import load_preset
 from hil_sim.bus import is_line
 from hil_sim.commands import options

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
 
-from bms.kan.model_file import KanModel
+from bms.model.model_file import KanModel
 from bms.presets import Preset
 from hil_sim.campaign.executors import local_workforce
 from hil_sim.faults.matrix import Row

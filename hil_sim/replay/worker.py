@@ -22,7 +22,7 @@ from hil_sim.replay.recording import load_recording
 EXTENSION = "bms.firmware._firmware"
 UNUSABLE = 2
 """Exit code when a build or log cannot be used and stderr says why."""
-REMEDY = "make one with 'python -m bms.firmware.build --tree TREE --out FOLDER'"
+REMEDY = "make one with 'python -m bms.native_build --tree TREE --out FOLDER'"
 
 
 def find_extension(folder: Path) -> Path:

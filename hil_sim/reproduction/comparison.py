@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bms.calibration.figures import FIGURES
-from bms.calibration.fit import CORE_TIME_CONSTANT_S, FREE_PARAMETERS
-from bms.kan import load_shipped_model
+from bms.model import load_shipped_model
 from bms.presets import Preset
+from bms.studies.paper_fit.figures import FIGURES
+from bms.studies.paper_fit.fit import CORE_TIME_CONSTANT_S, FREE_PARAMETERS
 from hil_sim.disturbances import DisturbanceKind
 from hil_sim.report.figures import seconds_by_constraint
 from hil_sim.reproduction.margins import SINGLE_MARGINS

@@ -10,9 +10,9 @@ from tempfile import TemporaryDirectory
 from typing import Protocol
 
 from bms.errors import InputError
-from bms.firmware.calibration import load_pair
 from bms.image import TARGETS as BOARDS
 from bms.image import calibration_part, with_calibration
+from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
 from hil_sim.bus import open_bus
 from hil_sim.replay.engine import replay

@@ -5,8 +5,8 @@ import numpy as np
 from bms.cell import CellState, integrate_step
 from bms.data.simulate import Samples, joined
 from bms.presets import load_preset
-from bms.rivals.estimator import Sequences
-from bms.rivals.thermal import FilterNoise
+from bms.studies.rivals.estimator import Sequences
+from bms.studies.rivals.thermal import FilterNoise
 
 CELL = load_preset("lin2014").cell
 PERIOD_S = 1.1

@@ -21,7 +21,7 @@ from bms.barrier.machinery import (
 )
 from bms.cell import CellState, Disturbance, integrate_step
 from bms.errors import InputError
-from bms.firmware.calibration import load_pair
+from bms.model.pair import load_pair
 from bms.presets import load_preset, preset_names
 from bms.verification.conditions import decided_conditions, firmware_constants
 

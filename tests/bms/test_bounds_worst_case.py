@@ -8,8 +8,8 @@ import pytest
 from bms.bounds.worst_case import CORE_BEYOND_LIMIT_K, Effort, worst_case
 from bms.data.profiles import Profiles, draw_profiles, start_range_K
 from bms.data.simulate import simulate
-from bms.kan.model_file import load_shipped_model
 from bms.kan.network import Edge, Network
+from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset
 
 QUICK = Effort(60, 5)

@@ -8,16 +8,16 @@ import pytest
 from matplotlib.mathtext import MathTextParser
 
 from bms.data.datasets import simulated_split
+from bms.data.lags import Lag
 from bms.data.simulate import joined
-from bms.explanation import explain
-from bms.explanation.fitting import candidates, chosen
-from bms.explanation.propagation import node_values, sensitivities
-from bms.explanation.report import Subject, as_latex, as_text
-from bms.explanation.symbols import input_symbol
-from bms.kan.lags import Lag
-from bms.kan.model_file import load_shipped_model, save_model, shipped_model_path
 from bms.kan.network import INPUT_NAMES
+from bms.model.model_file import load_shipped_model, save_model, shipped_model_path
 from bms.presets import DEFAULT_PRESET, load_preset
+from bms.studies.explanation import explain
+from bms.studies.explanation.fitting import candidates, chosen
+from bms.studies.explanation.propagation import node_values, sensitivities
+from bms.studies.explanation.report import Subject, as_latex, as_text
+from bms.studies.explanation.symbols import input_symbol
 from tests.bms.kan_samples import random_network, write_recording
 
 FUNCTIONS = {"exp": np.exp, "log": np.log, "sin": np.sin, "sqrt": np.sqrt, "tanh": np.tanh}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bms.cell import CellState, Disturbance, integrate_step
-from bms.kan.model_file import load_shipped_model
+from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset, preset_names
 
 PERIOD_S = 0.5

@@ -5,7 +5,7 @@ import pytest
 
 from bms.errors import InputError
 from bms.kan.domain import EVERYWHERE, Domain, domain_of
-from bms.kan.model_file import load_shipped_model
+from bms.model.model_file import load_shipped_model
 from bms.presets import preset_names
 
 

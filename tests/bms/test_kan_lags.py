@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.signal import cont2discrete, lsim
 
 from bms.data.datasets import simulated_split
+from bms.data.lags import Lag, at_rest, settling_time_s, step
 from bms.data.measurements import Measurements
-from bms.kan.lags import Lag, at_rest, settling_time_s, step
 from bms.presets import load_preset
 
 CURRENT = Lag("current_squared_A2", 10.0)

@@ -15,8 +15,9 @@ from bms.bounds.record import (
     WorstProfile,
 )
 from bms.errors import InputError
-from bms.kan.model_file import (
-    ErrorFigures,
+from bms.kan.accuracy import ErrorFigures
+from bms.kan.settings import TrainingSettings
+from bms.model.model_file import (
     KanModel,
     SplitErrors,
     TrainingRecord,
@@ -24,7 +25,6 @@ from bms.kan.model_file import (
     load_shipped_model,
     save_model,
 )
-from bms.kan.settings import TrainingSettings
 from bms.presets import load_preset, preset_names
 from tests.bms.kan_samples import random_network
 

@@ -10,10 +10,10 @@ from bms.data.datasets import simulated_split
 from bms.data.simulate import Samples, joined
 from bms.errors import InputError
 from bms.kan.accuracy import error_figures, measurement_error_K
-from bms.kan.build import model_for_measurements, model_for_preset
-from bms.kan.model_file import load_shipped_model
 from bms.kan.settings import TrainingSettings
 from bms.kan.training import train_network
+from bms.model.make import model_for_measurements, model_for_preset
+from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset, preset_names
 from tests.bms.kan_samples import random_network, write_recording
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bms.data.measurements import Measurements, read_measurements
-from bms.kan.build import model_for_measurements
 from bms.kan.settings import TrainingSettings
+from bms.model.make import model_for_measurements
 
 RECORDING = Path(__file__).parents[3] / "shared" / "data" / "a123_26650_hev_cycle_1.csv"
 pytestmark = pytest.mark.skipif(

@@ -11,9 +11,9 @@ import pytest
 
 from bms.errors import InputError, ModelMismatchError
 from bms.firmware import CompiledNetwork, Firmware
-from bms.kan.model_file import load_model, load_shipped_model
 from bms.kan.network import INPUT_NAMES
 from bms.kan.scaling import Scaling
+from bms.model.model_file import load_model, load_shipped_model
 from bms.presets import DEFAULT_PRESET, load_preset
 from bms.pykan_import import imported_model, imported_network, read_checkpoint
 from bms.pykan_import.model import UNKNOWN_ERROR_K

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from bms.data.measurements import COLUMNS, read_measurements
-from bms.kan.model_file import ErrorFigures, load_shipped_model, save_model, shipped_model_path
+from bms.kan.accuracy import ErrorFigures
+from bms.model.model_file import load_shipped_model, save_model, shipped_model_path
 from bms.presets import DEFAULT_PRESET
-from bms.rivals.comparison import Comparison, Row, Trace
-from bms.rivals.estimator import Cost
-from bms.rivals.verdict import AT_THE_FLOOR, verdict
+from bms.studies.rivals.comparison import Comparison, Row, Trace
+from bms.studies.rivals.estimator import Cost
+from bms.studies.rivals.verdict import AT_THE_FLOOR, verdict
 from tests.bms.rival_samples import charge
 
 KEYS = {

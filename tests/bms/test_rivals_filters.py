@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from bms.rivals.estimator import Sequences
-from bms.rivals.filters import ExtendedKalman, FullKalman, SteadyKalman
-from bms.rivals.tuning import FittedRows, tuned_filter, tuned_noise
+from bms.studies.rivals.estimator import Sequences
+from bms.studies.rivals.filters import ExtendedKalman, FullKalman, SteadyKalman
+from bms.studies.rivals.tuning import FittedRows, tuned_filter, tuned_noise
 from tests.bms.rival_samples import CELL, NOISE, PERIOD_S, charge, noisy_sequences
 
 MEASURED = np.array([0.0, 1.0])

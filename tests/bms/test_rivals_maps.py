@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bms.data.lags import Lag
 from bms.data.simulate import Samples, joined
-from bms.kan.lags import Lag
-from bms.rivals.effort import Effort
-from bms.rivals.estimator import BASE_COLUMNS, Sequences
-from bms.rivals.floor import static_floor
-from bms.rivals.linear import LinearEstimator
-from bms.rivals.perceptron import Perceptron, PerceptronEstimator, hidden_nodes
-from bms.rivals.timing import REPEATS, time_per_estimate_ns
+from bms.studies.rivals.effort import Effort
+from bms.studies.rivals.estimator import BASE_COLUMNS, Sequences
+from bms.studies.rivals.floor import static_floor
+from bms.studies.rivals.linear import LinearEstimator
+from bms.studies.rivals.perceptron import Perceptron, PerceptronEstimator, hidden_nodes
+from bms.studies.rivals.timing import REPEATS, time_per_estimate_ns
 from tests.bms.rival_samples import charge
 
 FLOAT32_K = 1e-3

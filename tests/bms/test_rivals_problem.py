@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
+from bms.data.lags import Lag
 from bms.data.simulate import joined
-from bms.kan.lags import Lag
 from bms.presets import load_preset
 from bms.presets.schema import Sensor
-from bms.rivals.estimator import Sequences
-from bms.rivals.lagged import lagged_columns
-from bms.rivals.readings import as_read
+from bms.studies.rivals.estimator import Sequences
+from bms.studies.rivals.lagged import lagged_columns
+from bms.studies.rivals.readings import as_read
 from tests.bms.rival_samples import PERIOD_S, charge
 
 LAGS = (Lag("current_squared_A2", 20.0), Lag("surface_temperature_rise_K", 35.0))

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from bms.firmware.calibration import load_pair
+from bms.model.pair import load_pair
 from bms.verification import CLASHING_DELTA4, SLIPS, Slip, verify
 from bms.verification.closed_loop import SlipCost, slip_cost
 from bms.verification.conditions import decided_conditions, firmware_constants, required_conditions

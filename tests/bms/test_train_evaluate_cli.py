@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from bms.data.datasets import simulated_split
+from bms.data.lags import Lag
 from bms.data.measurements import read_measurements
 from bms.data.profiles import draw_profiles
 from bms.data.simulate import simulate
-from bms.kan.lags import Lag
-from bms.kan.model_file import load_model, load_shipped_model, shipped_model_path
+from bms.model.model_file import load_model, load_shipped_model, shipped_model_path
 from bms.presets import DEFAULT_PRESET, load_preset, preset_names
 from tests.bms.kan_samples import write_recording
 

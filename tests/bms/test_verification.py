@@ -18,7 +18,7 @@ from bms.barrier.rounding import rounding_allowances
 from bms.cell import CellState, Disturbance, integrate_step, rates
 from bms.commands.verify import verify as command
 from bms.firmware import Firmware
-from bms.firmware.calibration import load_pair
+from bms.model.pair import load_pair
 from bms.presets import load_preset, preset_names
 from bms.verification import SLIPS, Verification, verify
 from bms.verification.conditions import (

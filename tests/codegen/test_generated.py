@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bms.errors import InputError, ModelMismatchError
-from bms.kan.model_file import load_shipped_model
+from bms.model.model_file import load_shipped_model
 from bms.presets import DEFAULT_PRESET, load_preset
 from codegen.calibration_source import calibration_source
 from codegen.can_document import can_document

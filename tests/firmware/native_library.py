@@ -13,7 +13,7 @@ from typing import Any
 
 from cffi import FFI
 
-from bms.firmware.build import FLAGS, declarations
+from bms.native_build import FLAGS, declarations
 
 FIRMWARE = Path(__file__).parents[2] / "firmware_c"
 FOLDERS = ("include", "src", "generated", "image", "boot", "port")

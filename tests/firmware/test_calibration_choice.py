@@ -9,7 +9,8 @@ from bms.firmware._firmware import lib
 
 from bms.errors import ModelMismatchError
 from bms.firmware import Firmware
-from bms.firmware.calibration import calibration_block, load_pair
+from bms.firmware.calibration import calibration_block
+from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET, preset_path
 
 NEAR_THE_CORE_LIMIT = {

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from bms.firmware import Ecu
-from bms.firmware.build import HEADERS
+from bms.native_build import CORE_HEADERS
 from bms.presets import DEFAULT_PRESET
 from tests.firmware.bench import DATABASE, HEALTHY, MEASURED, STATES, frame
 from tests.firmware.native_library import FIRMWARE, load_library
@@ -20,7 +20,11 @@ SOURCES = [
     FIRMWARE / "port" / "ecu_loop.c",
     NATIVE / "scripted_port.c",
 ]
-LOOP_HEADERS = [*(f"include/{name}.h" for name in HEADERS), "port/port.h", "port/ecu_loop.h"]
+LOOP_HEADERS = [
+    *(header.removeprefix("firmware_c/") for header in CORE_HEADERS),
+    "port/port.h",
+    "port/ecu_loop.h",
+]
 SYNC = (0x080, b"")
 COMMAND_ID = 0x180
 PERIOD_MS, SILENCE_MS = 100, 5000

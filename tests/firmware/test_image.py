@@ -14,8 +14,8 @@ from bms.firmware._firmware import ffi, lib
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bms.firmware.calibration import load_pair
 from bms.image import MEMORY_MAP, TARGETS, Header, calibration_of, calibration_part, check_image
+from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
 from tests.firmware.ports import BOARDS, CROSS, ROOT, build, built, image, needs_compiler
 

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from bms.errors import InputError
 from bms.firmware import CompiledNetwork, Firmware
-from bms.kan.model_file import KanModel, load_model, load_shipped_model, shipped_model_path
 from bms.kan.network import Edge, Network
+from bms.model.model_file import KanModel, load_model, load_shipped_model, shipped_model_path
 from bms.tables import network_tables
 
 PRESETS = ("lin2014", "paper_calibrated")

@@ -87,7 +87,7 @@ def test_broken_claim_is_noticed(mutant: Mutant, tmp_path: Path) -> None:
     assert mutant.old in text, "the mutant no longer applies; bring it up to date"
     source.write_text(text.replace(mutant.old, mutant.new))
     python = [sys.executable, "-m"]
-    build = [*python, "bms.firmware.build", "--tree", str(tree), "--out", str(tmp_path / "out")]
+    build = [*python, "bms.native_build", "--tree", str(tree), "--out", str(tmp_path / "out")]
     subprocess.run(build, check=True, cwd=ROOT, capture_output=True)
     run = [*python, "pytest", "-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", mutant.tests]
     run += ["--firmware-build", str(tmp_path / "out"), "-k", mutant.only]

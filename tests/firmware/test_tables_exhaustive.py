@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 from bms.firmware import CompiledNetwork
 from bms.firmware.edges import CompiledEdges
-from bms.kan.model_file import load_model, save_model, shipped_models
 from bms.kan.network import Network
-from bms.tables.exhaustive import EdgeSweep, check_network, edges_of
+from bms.model.model_file import load_model, save_model, shipped_models
 from bms.tables.rounding import arithmetic_error_K, edge_error_bounds
+from bms.verification.exhaustive import EdgeSweep, check_network, edges_of
 from tests.firmware.test_kan import box_points, random_model
 
 MODELS = pytest.mark.parametrize("path", shipped_models(), ids=lambda path: path.stem)

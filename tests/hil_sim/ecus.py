@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from bms.firmware import Ecu
-from bms.kan import load_shipped_model
+from bms.model import load_shipped_model
 
 IDENTITY_ID = 0x185
 

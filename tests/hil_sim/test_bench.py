@@ -136,7 +136,9 @@ def test_exactly_what_is_installed_is_timed(bms, modules, section, key, name):
     assert all(("median_time_ns" in row) == is_installed for row in rows)
 
 
-@pytest.mark.parametrize("module", ["hil_sim.bench.torch_estimate", "bms.rivals.perceptron"])
+@pytest.mark.parametrize(
+    "module", ["hil_sim.bench.torch_estimate", "bms.studies.rivals.perceptron"]
+)
 def test_a_module_of_our_own_that_does_not_import_is_no_missing_package(bms, monkeypatch, module):
     monkeypatch.delitem(sys.modules, "hil_sim.bench.torch_estimate", raising=False)
     monkeypatch.setitem(sys.modules, module, None)

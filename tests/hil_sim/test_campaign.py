@@ -13,7 +13,7 @@ import pytest
 
 from bms.cell import CellState, rates
 from bms.errors import InputError
-from bms.kan.model_file import load_shipped_model
+from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset
 from hil_sim.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
 from hil_sim.campaign.executors import (

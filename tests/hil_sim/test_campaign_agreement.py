@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bms.cell import CellState
-from bms.kan.model_file import load_shipped_model
+from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset
 from hil_sim.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
 from hil_sim.campaign.settings import CampaignSettings

@@ -6,7 +6,7 @@ import pytest
 
 from bms.errors import BusError, ModelMismatchError
 from bms.firmware import Ecu
-from bms.kan.model_file import shipped_model_path
+from bms.model.model_file import shipped_model_path
 from bms.presets import load_preset
 from hil_sim.disturbances import DisturbanceKind
 from hil_sim.recorder import Recorder

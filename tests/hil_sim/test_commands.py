@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bms.kan import shipped_model_path
+from bms.model import shipped_model_path
 from bms.presets import preset_path
 from tests.hil_sim.command_line import bms
 

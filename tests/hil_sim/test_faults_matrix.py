@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 
 from bms.errors import InputError
-from bms.firmware.calibration import load_pair
+from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
 from hil_sim.database import load_database
 from hil_sim.faults.frames import MessageFault

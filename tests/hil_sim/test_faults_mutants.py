@@ -41,7 +41,7 @@ def test_exactly_the_rows_of_an_ignored_fault_are_red(name, policy, message, tmp
     assert policy in text, "the mutant no longer applies; bring it up to date"
     source.write_text(text.replace(policy, policy[: policy.index("{")] + NEVER))
     python = [sys.executable, "-m"]
-    build = [*python, "bms.firmware.build", "--tree", str(tree), "--out", str(tmp_path / "out")]
+    build = [*python, "bms.native_build", "--tree", str(tree), "--out", str(tmp_path / "out")]
     subprocess.run(build, check=True, cwd=ROOT, capture_output=True)
     run = [*python, "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", MATRIX]
     run += ["--firmware-build", str(tmp_path / "out"), "-k", "test_quick_row"]

@@ -9,7 +9,7 @@ import cantools
 import pytest
 from cantools import autosar
 
-from bms.kan import load_shipped_model
+from bms.model import load_shipped_model
 from hil_sim.recorder import Recorder
 from hil_sim.session import Settings, run_both
 

@@ -14,8 +14,8 @@ import pytest
 
 from bms.errors import BusError, InputError, ModelMismatchError
 from bms.firmware import Ecu
-from bms.firmware.calibration import load_pair
-from bms.kan.model_file import load_model, shipped_model_path
+from bms.model.model_file import load_model, shipped_model_path
+from bms.model.pair import load_pair
 from hil_sim.nodes.line_losses import LOSS_ID
 from hil_sim.recorder import Recorder
 from hil_sim.session import Settings, run_both, run_on_clocks, run_plant, run_sil

@@ -7,7 +7,7 @@ import pytest
 
 from bms.errors import InputError
 from bms.firmware import Ecu
-from bms.kan.model_file import load_model, shipped_model_path
+from bms.model.model_file import load_model, shipped_model_path
 from bms.presets import load_preset, preset_path
 from hil_sim.database import load_database
 from hil_sim.logs import LogFrame, LogWriter, read_log

@@ -24,7 +24,7 @@ def deaf_to_cold_sensor(tmp_path_factory):
     text = source.read_text()
     assert text.count("limits->surface_deficit_K)") == 1
     source.write_text(text.replace("limits->surface_deficit_K)", "9999.0f)"))
-    build = [sys.executable, "-m", "bms.firmware.build", "--tree", folder / "tree"]
+    build = [sys.executable, "-m", "bms.native_build", "--tree", folder / "tree"]
     subprocess.run([*build, "--out", folder / "out"], check=True, cwd=ROOT, capture_output=True)
     return folder / "out"
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from bms.calibration.figures import FIGURES
 from bms.errors import InputError
 from bms.firmware import Ecu
 from bms.presets import load_preset
+from bms.studies.paper_fit.figures import FIGURES
 from hil_sim.disturbances import DisturbanceKind
 from hil_sim.reproduction.comparison import compare
 from hil_sim.reproduction.files import content_json, runs_csv

@@ -17,8 +17,8 @@ import pytest
 
 from bms.errors import BusError, InputError
 from bms.firmware import Ecu
-from bms.firmware.calibration import load_pair
-from bms.kan.model_file import shipped_model_path
+from bms.model.model_file import shipped_model_path
+from bms.model.pair import load_pair
 from hil_sim.bus import Frame, open_bus
 from hil_sim.faults.runner import MatrixSettings
 from hil_sim.replay.engine import replay

@@ -7,7 +7,7 @@ import os
 import subprocess
 from pathlib import Path
 
-from bms.firmware.build import FLAGS, ROOT, SANITIZERS
+from bms.native_build import FLAGS, ROOT, SANITIZERS
 
 HERE = Path(__file__).parent
 PARTS = {"fuzz": ("fuzz", "damage", "session"), "benchmark": ("benchmark", "session")}

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from bms.firmware import Ecu
-from bms.kan.model_file import shipped_model_path
+from bms.model.model_file import shipped_model_path
 from bms.presets import load_preset
 from hil_sim.bus import open_bus
 from hil_sim.charger import Charger

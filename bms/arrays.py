@@ -1,0 +1,9 @@
+"""Types of the arrays that the numerical parts pass to each other."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]

@@ -1,6 +1,0 @@
-"""What a trained network has learned: its edge functions, formulas for them, sensitivities."""
-
-from bms.explanation.approximation import Approximation
-from bms.explanation.explain import EdgeExplanation, Explanation, Sensitivity, explain
-
-__all__ = ["Approximation", "EdgeExplanation", "Explanation", "Sensitivity", "explain"]

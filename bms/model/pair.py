@@ -1,0 +1,38 @@
+"""A preset and the model that goes with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bms.errors import ModelMismatchError
+from bms.kan.network import INPUT_NAMES
+from bms.model.model_file import KanModel, load_model, load_shipped_model
+from bms.presets import Preset, load_preset
+
+
+def load_pair(
+    preset: str | Path | Preset, model: str | Path | KanModel | None
+) -> tuple[Preset, KanModel]:
+    """Preset and model by name, path or object; without a model the one that ships with it."""
+    chosen = preset if isinstance(preset, Preset) else load_preset(preset)
+    if isinstance(model, KanModel):
+        return chosen, model
+    return chosen, load_shipped_model(chosen.name) if model is None else load_model(Path(model))
+
+
+def check_pair(preset: Preset, model: KanModel) -> None:
+    """Raise ModelMismatchError when the model was trained for another cell or box."""
+    names = model.network.input_names
+    if names[: len(INPUT_NAMES)] != INPUT_NAMES or len(names) != len(INPUT_NAMES) + len(
+        model.network.lags
+    ):
+        raise ModelMismatchError(
+            f"model with inputs {list(model.network.input_names)}: the firmware has "
+            f"{list(INPUT_NAMES)} and filtered ones"
+        )
+    if model.training_hash is not None and model.training_hash != preset.training_hash:
+        raise ModelMismatchError(
+            f"model {model.hash[:8]} was trained for preset '{model.preset}' with other cell, "
+            f"uncertainty or box than preset '{preset.name}' has; train it again with "
+            f"'bms train --preset {preset.name} --out model.json'"
+        )

@@ -1,0 +1,7 @@
+"""The extensions of an installation, for cffi's part of setuptools; see setup.py."""
+
+from bms.native_build import FIRMWARE
+from bms.studies.rivals.native_build import RIVALS
+from hil_sim.campaign.native_build import RUNNER
+
+firmware, rivals, runner = (extension.builder() for extension in (FIRMWARE, RIVALS, RUNNER))
