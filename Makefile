@@ -6,11 +6,11 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 BIN := .venv/bin
-RUNNER := hil_sim/campaign/native
+RUNNER := hil_sim/studies/campaign/native
 RIVALS := bms/studies/rivals/native
 C_PROGRAMS := tests/firmware/native
 SOURCES := $(wildcard firmware_c/*/*.[ch] $(RUNNER)/*.[ch] $(RIVALS)/*.[ch]) \
-  bms/native_build.py bms/studies/rivals/native_build.py hil_sim/campaign/native_build.py tools/native_extensions.py setup.py
+  bms/native_build.py bms/studies/rivals/native_build.py hil_sim/studies/campaign/native_build.py tools/native_extensions.py setup.py
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 C_WARNINGS := -std=c99 -pedantic -Wall -Wextra -Werror -Wconversion -Wdouble-promotion -Wmissing-prototypes
 C_INCLUDES := $(addprefix -Ifirmware_c/, include src generated image boot port)
@@ -61,7 +61,7 @@ benchmark: .venv/tests ## Time of a control period of the ECU in C, and what dom
 	build/native/benchmark 50000
 
 clean: ## Remove everything that set-up, build and runs have made
-	rm -rf .venv build out *.egg-info bms/firmware/_firmware.* bms/studies/rivals/_rivals.* hil_sim/campaign/_runner.*
+	rm -rf .venv build out *.egg-info bms/firmware/_firmware.* bms/studies/rivals/_rivals.* hil_sim/studies/campaign/_runner.*
 
 .venv/runtime: pyproject.toml constraints.txt $(SOURCES)
 	tools/check_machine.sh $(PYTHON)

@@ -1,5 +1,5 @@
 /* Counts instructions on an emulated target: reads records from a file of the host, runs what each
- * asks for, and writes the timer ticks that it took. hil_sim/cost makes the records.
+ * asks for, and writes the timer ticks that it took. hil_sim/studies/cost makes the records.
  *
  * Command line: any name, the file of records, the file for the ticks. The emulator lets its time
  * advance by the same step with every instruction, so that ticks are instructions.

@@ -13,12 +13,12 @@ from rich.console import Console
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.errors import InputError
-from hil_sim.bench.outcome import outcome_json
-from hil_sim.bench.race import Clocks, WrongAnswerError
-from hil_sim.bench.run import FULL, QUICK, Section, run_benchmark
-from hil_sim.bench.simulation import BUSES
-from hil_sim.bench.tables import print_tables
 from hil_sim.commands import options
+from hil_sim.studies.bench.outcome import outcome_json
+from hil_sim.studies.bench.race import Clocks, WrongAnswerError
+from hil_sim.studies.bench.run import FULL, QUICK, Section, run_benchmark
+from hil_sim.studies.bench.simulation import BUSES
+from hil_sim.studies.bench.tables import print_tables
 
 CAMPAIGN_RUNS = (100, 1000, 10_000)
 QUICK_CAMPAIGN_RUNS = (20,)

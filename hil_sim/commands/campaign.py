@@ -18,13 +18,13 @@ from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.model.pair import load_pair
-from hil_sim.campaign.executors import Workforce, dask_workforce, local_workforce
-from hil_sim.campaign.histogram import save_histograms
-from hil_sim.campaign.run import run_campaign
-from hil_sim.campaign.settings import CampaignSettings
-from hil_sim.campaign.store import CampaignFolder
-from hil_sim.campaign.summary import firmware_is_safe, summarise
 from hil_sim.commands import options
+from hil_sim.run.workforce import Workforce, dask_workforce, local_workforce
+from hil_sim.studies.campaign.histogram import save_histograms
+from hil_sim.studies.campaign.run import run_campaign
+from hil_sim.studies.campaign.settings import CampaignSettings
+from hil_sim.studies.campaign.store import CampaignFolder
+from hil_sim.studies.campaign.summary import firmware_is_safe, summarise
 
 
 def campaign(

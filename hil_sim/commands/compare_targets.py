@@ -22,8 +22,8 @@ from bms.presets import DEFAULT_PRESET
 from hil_sim.commands import options
 from hil_sim.commands.fault_matrix import chosen_rows
 from hil_sim.commands.replay_output import first_json, first_table
-from hil_sim.faults.matrix import Row, load_matrix
-from hil_sim.faults.runner import MatrixSettings
+from hil_sim.fault_matrix.matrix import Row, load_matrix
+from hil_sim.fault_matrix.runner import MatrixSettings
 from hil_sim.replay.signals import Signals
 from hil_sim.targets.agreement import Agreement, FrameDifference, compare_targets
 from hil_sim.targets.catalog import BUILD, NAMES, find_target

@@ -14,9 +14,9 @@ from rich.table import Table
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.commands import options
-from hil_sim.cost import CostReport, measure_cost
-from hil_sim.cost.chart import cost_chart
 from hil_sim.report.folder import OutputFolder
+from hil_sim.studies.cost import CostReport, measure_cost
+from hil_sim.studies.cost.chart import cost_chart
 from hil_sim.targets.catalog import BOARD_NAMES, board_name, built_folder
 
 

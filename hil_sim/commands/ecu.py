@@ -9,11 +9,11 @@ import typer
 
 from bms.firmware import Ecu
 from bms.presets import DEFAULT_PRESET
-from hil_sim.bus import open_bus, require_shared
-from hil_sim.clock import WallClock
+from hil_sim.bus.buses import open_bus, require_shared
 from hil_sim.commands.stopping import stop_event
+from hil_sim.nodes.clock import WallClock
 from hil_sim.nodes.ecu import EcuNode
-from hil_sim.punctuality import Slots, Spread
+from hil_sim.nodes.punctuality import Slots, Spread
 
 
 def ecu(

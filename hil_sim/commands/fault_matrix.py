@@ -22,8 +22,8 @@ from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.errors import InputError
 from bms.model.pair import load_pair
 from hil_sim.commands import options
-from hil_sim.faults.matrix import Row, load_matrix
-from hil_sim.faults.report import (
+from hil_sim.fault_matrix.matrix import Row, load_matrix
+from hil_sim.fault_matrix.report import (
     MatrixResult,
     expected_text,
     latch_text,
@@ -31,8 +31,8 @@ from hil_sim.faults.report import (
     matrix_junit,
     matrix_page,
 )
-from hil_sim.faults.runner import MatrixSettings, play_all
-from hil_sim.faults.verdict import Verdict
+from hil_sim.fault_matrix.runner import MatrixSettings, play_all
+from hil_sim.fault_matrix.verdict import Verdict
 from hil_sim.report.folder import OutputFolder
 
 
@@ -51,7 +51,7 @@ def fault_matrix(
     ] = None,
     matrix: Annotated[
         Path | None,
-        typer.Option("--matrix", help="TOML file of rows. Default: hil_sim/faults/matrix.toml."),
+        typer.Option("--matrix", help="TOML file of rows. Default: the matrix of the project."),
     ] = None,
     jobs: Annotated[
         int,

@@ -10,10 +10,9 @@ import typer
 from rich.console import Console
 from rich.live import Live
 
-from hil_sim.bus import require_shared
-from hil_sim.clock import WallClock
+from hil_sim.bus.buses import require_shared
+from hil_sim.bus.database import load_database
 from hil_sim.commands.stopping import stop_event
-from hil_sim.database import load_database
 from hil_sim.monitor.keyboard import Keyboard
 from hil_sim.monitor.line import status_line
 from hil_sim.monitor.listener import Listener
@@ -21,6 +20,7 @@ from hil_sim.monitor.model import Snapshot, SystemModel
 from hil_sim.monitor.presets import preset_finder
 from hil_sim.monitor.screen import Screen
 from hil_sim.monitor.watch import watch
+from hil_sim.nodes.clock import WallClock
 
 SCREEN_REFRESH_S = 0.25
 LINE_REFRESH_S = 1.0

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from bms.presets import DEFAULT_PRESET
-from hil_sim.disturbances import DisturbanceKind
+from hil_sim.plant.disturbances import DisturbanceKind
 
 PresetOption = Annotated[
     str, typer.Option("--preset", help="Name of a shipped preset, or path of a TOML file.")

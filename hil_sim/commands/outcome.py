@@ -13,12 +13,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from hil_sim.logs import usable_format
-from hil_sim.recorder import Recorder
+from hil_sim.logs.recorder import Recorder
 from hil_sim.report.files import summary_json, write_report
 from hil_sim.report.folder import OutputFolder
 from hil_sim.report.table import print_table
-from hil_sim.result import RunResult
-from hil_sim.session import Settings
+from hil_sim.run.result import RunResult
+from hil_sim.run.session import Settings
 
 
 class Run(Protocol):

@@ -9,9 +9,9 @@ import typer
 from bms.presets import load_preset
 from hil_sim.commands import options
 from hil_sim.commands.outcome import charge_and_report
-from hil_sim.disturbances import DisturbanceKind
 from hil_sim.faults import load_faults
-from hil_sim.session import Settings, run_plant
+from hil_sim.plant.disturbances import DisturbanceKind
+from hil_sim.run.session import Settings, run_plant
 
 
 def plant(

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from hil_sim.database import Values
+from hil_sim.bus.database import Values
 from hil_sim.replay.builds import LogVerdict
 from hil_sim.replay.comparison import Comparison, PeriodDifference
 from hil_sim.replay.outcome import Outcome

@@ -21,9 +21,9 @@ from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.presets import Preset, load_preset
 from hil_sim.commands import options
 from hil_sim.report.folder import OutputFolder
-from hil_sim.reproduction.files import CAUTION, content_json, write_reproduction
-from hil_sim.reproduction.runs import PRESETS, Case, Results, all_cases, run_cases
-from hil_sim.reproduction.sections import BAD, Section, passed, sections
+from hil_sim.studies.reproduction.files import CAUTION, content_json, write_reproduction
+from hil_sim.studies.reproduction.runs import PRESETS, Case, Results, all_cases, run_cases
+from hil_sim.studies.reproduction.sections import BAD, Section, passed, sections
 
 
 def reproduce(

@@ -11,12 +11,12 @@ import typer
 from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.presets import load_preset
-from hil_sim.bus import is_line
+from hil_sim.bus.buses import is_line
 from hil_sim.commands import options
 from hil_sim.commands.outcome import charge_and_report
-from hil_sim.disturbances import DisturbanceKind
 from hil_sim.faults import load_faults
-from hil_sim.session import ControllerKind, Settings, run_sil
+from hil_sim.plant.disturbances import DisturbanceKind
+from hil_sim.run.session import ControllerKind, Settings, run_sil
 from hil_sim.targets.catalog import find_board
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from annotated_types import Gt, Le
 
 from bms.validation import strict
-from hil_sim.clock import Clock
 from hil_sim.faults.base import Fault
+from hil_sim.nodes.clock import Clock
 
 _MS_PER_S = 1000.0
 

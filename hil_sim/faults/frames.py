@@ -15,8 +15,8 @@ from annotated_types import Ge, Le
 
 from bms.errors import InputError
 from bms.validation import strict
-from hil_sim.bus import Frame
-from hil_sim.database import COUNTER_MODULUS, MessageCodec, profile2_crc
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.database import COUNTER_MODULUS, MessageCodec, profile2_crc
 from hil_sim.faults.base import Fault
 
 MAX_DATA_LENGTH = 8

@@ -8,18 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from bms.cell import CellState
-from hil_sim.bus import Frame
-from hil_sim.clock import Clock, WallClock
-from hil_sim.database import MessageCodec
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.database import MessageCodec
 from hil_sim.faults.base import Fault
 from hil_sim.faults.clocks import ClockJitter
 from hil_sim.faults.ecu import EcuRestarted, RestartableEcu
 from hil_sim.faults.frames import FrameFault, FrameMemory
 from hil_sim.faults.plant import ChargerFault, PumpFailed
 from hil_sim.faults.sensors import SensorFault, SensorMemory
+from hil_sim.nodes.clock import Clock, WallClock
 from hil_sim.nodes.ecu import EcuLike
-from hil_sim.plant import Plant
-from hil_sim.sensors import Readings
+from hil_sim.plant.plant import Plant
+from hil_sim.plant.sensors import Readings
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from bms.errors import InputError
 from bms.validation import parse, read_toml, strict
-from hil_sim.database import MessageCodec, load_database
+from hil_sim.bus.database import MessageCodec, load_database
 from hil_sim.faults.base import Fault
 from hil_sim.faults.clocks import CLOCK_FAULTS
 from hil_sim.faults.ecu import ECU_FAULTS

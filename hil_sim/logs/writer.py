@@ -11,7 +11,7 @@ from typing import Any
 import can
 from can.io.logger import MESSAGE_WRITERS
 
-from hil_sim.closing import Closing
+from hil_sim.bus.closing import Closing
 from hil_sim.logs.formats import is_compressed, usable_format
 from hil_sim.logs.frame import LogFrame
 

@@ -7,7 +7,7 @@ import select
 import sys
 from typing import Any
 
-from hil_sim.closing import Closing
+from hil_sim.bus.closing import Closing
 
 try:
     import termios

@@ -8,8 +8,8 @@ from typing import Any
 import can
 
 from bms.errors import BusError
-from hil_sim.bus import Frame, one_line, open_interface
-from hil_sim.closing import Closing
+from hil_sim.bus.buses import Frame, one_line, open_interface
+from hil_sim.bus.closing import Closing
 
 # slcan: the adapter then does not even acknowledge frames.
 # socketcan: CAN FD frames are not delivered unless asked for.

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from codegen import can_database
-from hil_sim.bus import Frame
-from hil_sim.database import MessageCodec, Values
-from hil_sim.identity import Identity
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.database import MessageCodec, Values
+from hil_sim.bus.identity import Identity
 from hil_sim.monitor.listener import ForeignFrame
 from hil_sim.monitor.traffic import ForeignMeter, ForeignTraffic, MessageMeter, MessageTraffic
 

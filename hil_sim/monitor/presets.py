@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bms.presets import Preset, load_preset, preset_names
-from hil_sim.identity import Identity
+from hil_sim.bus.identity import Identity
 
 _DIGITS = 4
 

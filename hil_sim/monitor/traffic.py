@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter, deque
 from dataclasses import dataclass, field
 
-from hil_sim.bus import Frame
-from hil_sim.database import MessageCodec, Values
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.database import MessageCodec, Values
 from hil_sim.monitor.listener import ForeignFrame
 
 RATE_WINDOW_S = 3.0

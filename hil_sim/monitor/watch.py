@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hil_sim.clock import Clock
 from hil_sim.monitor.listener import Listener
 from hil_sim.monitor.model import Snapshot, SystemModel
+from hil_sim.nodes.clock import Clock
 
 
 def watch(

@@ -8,14 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from hil_sim.bus import CanBus, Frame
-from hil_sim.clock import Clock
-from hil_sim.punctuality import DEADLINE_PERIODS, Slots
+from hil_sim.bus.buses import CanBus, Frame
+from hil_sim.bus.identifiers import MEASUREMENT_ID, SYNC_ID
+from hil_sim.nodes.clock import Clock
+from hil_sim.nodes.punctuality import DEADLINE_PERIODS, Slots
 
-SYNC_ID = 0x080
-"""Start of a control period in lock step (CiA 301)."""
-MEASUREMENT_ID = 0x100
-"""CellElectrical, with which the plant begins a period."""
 PHASE_PERIODS = 20
 """Measurements after which an ECU on its own clock corrects its phase."""
 

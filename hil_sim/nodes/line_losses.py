@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-from hil_sim.bus import CanBus, Frame
+from hil_sim.bus.buses import CanBus, Frame
 
 LOSS_ID = 0x7F0
 """Of SLCAN_LINK_LOSS_ID in firmware_c/port/slcan_link.h, which explains the frame."""

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 from bms.errors import BusError
 from bms.firmware import Reception, ReceptionCounts
-from hil_sim.bus import CanBus, Frame, ecu_remedy, is_line
-from hil_sim.database import COUNTER_MODULUS, MessageCodec, Values
-from hil_sim.e2e import Receiver, Sender
+from hil_sim.bus.buses import CanBus, Frame, ecu_remedy, is_line
+from hil_sim.bus.database import COUNTER_MODULUS, MessageCodec, Values
+from hil_sim.bus.e2e import Receiver, Sender
+from hil_sim.logs.recorder import Recorder
 from hil_sim.nodes.turns import Turn
-from hil_sim.recorder import Recorder
-from hil_sim.sensors import Readings
+from hil_sim.plant.sensors import Readings
 
 REQUEST_OFF, REQUEST_CHARGE = 0, 1
 NO_FAULT = 255

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Protocol
 
-from hil_sim.bus import CanBus, Frame
-from hil_sim.clock import Clock
-from hil_sim.punctuality import PlantWatch
+from hil_sim.bus.buses import CanBus, Frame
+from hil_sim.nodes.clock import Clock
+from hil_sim.nodes.punctuality import PlantWatch
 
 MOST_FRAMES = 10_000
 """Foreign frames after which an ECU that does not answer is taken for silent."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from bms.errors import InputError
-from hil_sim.bus import Frame
+from hil_sim.bus.buses import Frame
 from hil_sim.logs import log_suffixes
 from hil_sim.replay.comparison import Comparison, compare
 from hil_sim.replay.outcome import outcome

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
-from hil_sim.bus import Frame
-from hil_sim.database import Values
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.database import Values
 from hil_sim.replay.recording import Answer, Period, Recording
 from hil_sim.replay.signals import Signals
 

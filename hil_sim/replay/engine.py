@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from hil_sim.bus import Frame
+from hil_sim.bus.buses import Frame
 from hil_sim.logs import LogFrame, LogWriter
 from hil_sim.nodes.ecu import EcuLike
 from hil_sim.replay.recording import Answer, Recording

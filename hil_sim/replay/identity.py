@@ -7,7 +7,7 @@ from pathlib import Path
 from bms.errors import InputError
 from bms.model.model_file import KanModel, load_model, shipped_model_path, shipped_models
 from bms.presets import Preset, load_preset, preset_names
-from hil_sim.identity import Identity
+from hil_sim.bus.identity import Identity
 from hil_sim.replay.recording import Recording
 
 IDENTITY = "Identity"

@@ -12,10 +12,10 @@ from pathlib import Path
 
 from bms.errors import InputError
 from codegen import can_database
-from hil_sim.bus import Frame
-from hil_sim.database import MessageCodec
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.database import MessageCodec
+from hil_sim.bus.identifiers import SYNC_ID
 from hil_sim.logs import LogFrame, read_log
-from hil_sim.nodes.ecu import SYNC_ID
 
 LAST_MESSAGE = "ChargeCommand"
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from functools import cached_property
 
 from codegen import can_database
-from hil_sim.bus import Frame
-from hil_sim.database import MessageCodec, Values
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.database import MessageCodec, Values
 
 _FAULT_BITS = ("ActiveFaults", "LatchedFaults")
 _UNIT_NAMES = {"": "", "1": "", "1/s": "per_s", "K/s": "K_per_s", "K/s^2": "K_per_s2"}

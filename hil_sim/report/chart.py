@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bms.presets.schema import Limits
-from hil_sim.result import RunResult
+from hil_sim.run.result import RunResult
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers and in grey.
 CONTROLLER_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")

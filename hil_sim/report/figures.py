@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from bms.presets.schema import Limits
-from hil_sim.result import CHARGING_STATES, RunResult, Summary
+from hil_sim.run.result import CHARGING_STATES, RunResult, Summary
 
 
 class Figure(NamedTuple):

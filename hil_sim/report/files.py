@@ -10,8 +10,8 @@ from hil_sim.report.figures import figures, seconds_by_constraint
 from hil_sim.report.folder import OutputFolder
 from hil_sim.report.page import data_url, render_page
 from hil_sim.report.timing import timing_chart, timing_figures
-from hil_sim.result import RunResult
-from hil_sim.session import Settings
+from hil_sim.run.result import RunResult
+from hil_sim.run.session import Settings
 
 
 def summary_json(results: list[RunResult]) -> dict[str, Any]:

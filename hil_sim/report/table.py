@@ -10,8 +10,8 @@ from rich.table import Table
 
 from hil_sim.report.figures import figures
 from hil_sim.report.timing import timing_figures
-from hil_sim.result import RunResult
-from hil_sim.session import Settings
+from hil_sim.run.result import RunResult
+from hil_sim.run.session import Settings
 
 
 def print_table(

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from hil_sim.punctuality import PlantWatch, Spread, Timing
+from hil_sim.nodes.punctuality import PlantWatch, Spread, Timing
 from hil_sim.report.chart import CONTROLLER_COLOURS, png
 from hil_sim.report.figures import Figure
-from hil_sim.result import RunResult
+from hil_sim.run.result import RunResult
 
 _BINS = 60
 _MS_PER_S = 1000.0

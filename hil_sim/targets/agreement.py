@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 from bms.errors import BusError
-from hil_sim.bus import Frame
+from hil_sim.bus.buses import Frame
 from hil_sim.replay.comparison import Comparison, compare
 from hil_sim.replay.recording import Answer
 from hil_sim.replay.signals import Signals

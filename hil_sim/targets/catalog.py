@@ -14,7 +14,7 @@ from bms.image import TARGETS as BOARDS
 from bms.image import calibration_part, with_calibration
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
-from hil_sim.bus import open_bus
+from hil_sim.bus.buses import open_bus
 from hil_sim.replay.engine import replay
 from hil_sim.replay.identity import choose_pair
 from hil_sim.replay.recording import LAST_MESSAGE, Answer, Recording

@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from bms.errors import BusError, InputError
-from hil_sim.bus import Frame
+from hil_sim.bus.buses import Frame
 from hil_sim.replay.recording import LAST_MESSAGE, Answer, Recording
 
 ROOT = Path(__file__).parents[2]

@@ -13,7 +13,7 @@ from typing import IO
 
 from bms.errors import BusError, InputError
 from bms.image import TARGETS
-from hil_sim.closing import Closing
+from hil_sim.bus.closing import Closing
 
 PROGRAM = "qemu-system-arm"
 HOST = "127.0.0.1"
@@ -31,8 +31,8 @@ def require_emulator() -> str:
 class Emulation(Closing):
     """A running board; a context manager that ends it.
 
-    `bus` is the name under which hil_sim.bus.open_bus reaches its serial line, which one party at
-    a time can use. The line is listened on before the board starts, so that nobody comes too early.
+    `bus` is the name under which open_bus reaches its serial line, which one party at a time can
+    use. The line is listened on before the board starts, so that nobody comes too early.
     """
 
     def __init__(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bms.errors import BusError
-from hil_sim.bus import CanBus, Frame
+from hil_sim.bus.buses import CanBus, Frame
 
 _ANSWER_TIMEOUT_S = 10.0
 _MOST_FRAMES = 1000

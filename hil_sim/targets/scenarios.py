@@ -8,11 +8,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from bms.errors import InputError
-from hil_sim.faults.matrix import Row
-from hil_sim.faults.runner import MatrixSettings, run_settings
-from hil_sim.recorder import Recorder
+from hil_sim.fault_matrix.matrix import Row
+from hil_sim.fault_matrix.runner import MatrixSettings, run_settings
+from hil_sim.logs.recorder import Recorder
 from hil_sim.replay.recording import Recording, load_recording
-from hil_sim.session import Settings, run_both
+from hil_sim.run.session import Settings, run_both
 
 FULL_CHARGE = "full charge"
 

@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 from bms.firmware._firmware import lib
 
-from hil_sim.bus import Frame, open_bus
-from hil_sim.database import load_database
-from hil_sim.e2e import Receiver
+from hil_sim.bus.buses import Frame, open_bus
+from hil_sim.bus.database import load_database
+from hil_sim.bus.e2e import Receiver
 from hil_sim.targets import Emulation
 from tests.firmware.damaged_images import (
     APPLICATION,

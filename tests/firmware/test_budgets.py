@@ -17,7 +17,7 @@ from codegen.budgets.call_graph import CallGraph, read_call_graph
 from codegen.budgets.library_stack import library_frames
 from codegen.budgets.link_map import read_map
 from codegen.budgets.measure import measure
-from hil_sim.bus import Frame, open_bus
+from hil_sim.bus.buses import Frame, open_bus
 from hil_sim.targets import Emulation
 from tests.firmware.bench import HEALTHY, MEASURED, frame
 from tests.firmware.monitor import monitor, monitor_options

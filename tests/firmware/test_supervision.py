@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from bms.presets import load_preset
 from codegen.can_database import load_database, number_attribute
-from hil_sim.charger import Charger
+from hil_sim.plant.charger import Charger
 from tests.firmware.bench import DATABASE, MEASURED, READY_PERIODS, Bench, frame
 
 NO_DATA, INIT, VALID, INVALID = range(4)

@@ -3,7 +3,7 @@
 import pytest
 
 from bms.presets import Preset, load_preset, preset_names
-from hil_sim.database import MessageCodec, load_database
+from hil_sim.bus.database import MessageCodec, load_database
 
 
 @pytest.fixture(scope="session")

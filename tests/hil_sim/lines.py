@@ -6,7 +6,7 @@ import socket
 from collections.abc import Callable
 from threading import Thread
 
-from hil_sim.closing import Closing
+from hil_sim.bus.closing import Closing
 
 _PATIENCE_S = 10.0
 

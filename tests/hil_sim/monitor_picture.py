@@ -12,8 +12,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil_sim.bus import Frame
-from hil_sim.database import load_database
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.database import load_database
 from hil_sim.logs import read_log
 from hil_sim.monitor.model import Snapshot, SystemModel
 from hil_sim.monitor.presets import preset_finder

@@ -13,14 +13,14 @@ import pytest
 
 from bms.cell import CellState, integrate_step
 from bms.presets import DEFAULT_PRESET, load_preset
-from hil_sim.bench import simulation
-from hil_sim.bench.generated_solver import GENERATED
-from hil_sim.bench.layers import sampled
-from hil_sim.bench.problem import charge_problem
-from hil_sim.bench.race import Absent, Clocks, Peer, Spread, WrongAnswerError, race
-from hil_sim.bench.simulation import bus_speed
 from hil_sim.faults import load_faults
-from hil_sim.session import Settings
+from hil_sim.run.session import Settings
+from hil_sim.studies.bench import simulation
+from hil_sim.studies.bench.generated_solver import GENERATED
+from hil_sim.studies.bench.layers import sampled
+from hil_sim.studies.bench.problem import charge_problem
+from hil_sim.studies.bench.race import Absent, Clocks, Peer, Spread, WrongAnswerError, race
+from hil_sim.studies.bench.simulation import bus_speed
 from tests.firmware.constraints import interval, quadratics
 
 RIGHT = np.array([1.0, 2.0, 3.0, 4.0])
@@ -137,24 +137,24 @@ def test_exactly_what_is_installed_is_timed(bms, modules, section, key, name):
 
 
 @pytest.mark.parametrize(
-    "module", ["hil_sim.bench.torch_estimate", "bms.studies.rivals.perceptron"]
+    "module", ["hil_sim.studies.bench.torch_estimate", "bms.studies.rivals.perceptron"]
 )
 def test_a_module_of_our_own_that_does_not_import_is_no_missing_package(bms, monkeypatch, module):
-    monkeypatch.delitem(sys.modules, "hil_sim.bench.torch_estimate", raising=False)
+    monkeypatch.delitem(sys.modules, "hil_sim.studies.bench.torch_estimate", raising=False)
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(ImportError, match=module):
         bms("bench", "--quick", "--section", "estimate")
 
 
 def test_answers_that_differ_end_in_exit_code_1_with_the_names(bms, monkeypatch):
-    monkeypatch.setattr("hil_sim.bench.decision.SOLVER_TOLERANCE_A", 0.0)
+    monkeypatch.setattr("hil_sim.studies.bench.decision.SOLVER_TOLERANCE_A", 0.0)
     code, out, err = bms("bench", "--quick", "--section", "decision")
     assert (code, out) == (1, "")
     assert err.startswith("bms: OSQP, set-up and solve: answers ")
 
 
 def test_what_is_not_installed_is_named_with_the_remedy(bms, monkeypatch):
-    monkeypatch.delitem(sys.modules, "hil_sim.bench.torch_estimate", raising=False)
+    monkeypatch.delitem(sys.modules, "hil_sim.studies.bench.torch_estimate", raising=False)
     for module in ("osqp", "torch"):
         monkeypatch.setitem(sys.modules, module, None)
     code, out, _ = bms("bench", "--quick", "--section", "decision", "--section", "estimate")
@@ -247,7 +247,15 @@ def test_a_campaign_tells_its_throughput(bms):
 
 def test_the_guest_runs_the_same_and_answers_in_json():
     done = subprocess.run(
-        [sys.executable, "-m", "hil_sim.bench", "virtual:guest", DEFAULT_PRESET, "1.0", "2"],
+        [
+            sys.executable,
+            "-m",
+            "hil_sim.studies.bench",
+            "virtual:guest",
+            DEFAULT_PRESET,
+            "1.0",
+            "2",
+        ],
         capture_output=True,
         text=True,
         check=True,

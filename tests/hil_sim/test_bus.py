@@ -6,7 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bms.errors import BusError, InputError
-from hil_sim.bus import Frame, ecu_remedy, is_line, open_bus, require_room_for_ecu, require_shared
+from hil_sim.bus.buses import (
+    Frame,
+    ecu_remedy,
+    is_line,
+    open_bus,
+    require_room_for_ecu,
+    require_shared,
+)
 
 
 @pytest.fixture

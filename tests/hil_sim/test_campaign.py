@@ -15,19 +15,19 @@ from bms.cell import CellState, rates
 from bms.errors import InputError
 from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset
-from hil_sim.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
-from hil_sim.campaign.executors import (
+from hil_sim.commands import campaign as command
+from hil_sim.run.workforce import (
     InlineExecutor,
     Workforce,
     dask_workforce,
     local_workforce,
 )
-from hil_sim.campaign.run import run_campaign
-from hil_sim.campaign.settings import CHUNK_RUNS, CampaignSettings
-from hil_sim.campaign.store import CampaignFolder
-from hil_sim.campaign.summary import column, firmware_is_safe, summarise
-from hil_sim.campaign.worker import header, run_chunk
-from hil_sim.commands import campaign as command
+from hil_sim.studies.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
+from hil_sim.studies.campaign.run import run_campaign
+from hil_sim.studies.campaign.settings import CHUNK_RUNS, CampaignSettings
+from hil_sim.studies.campaign.store import CampaignFolder
+from hil_sim.studies.campaign.summary import column, firmware_is_safe, summarise
+from hil_sim.studies.campaign.worker import header, run_chunk
 
 PRESET = "paper_calibrated"
 ALONE = Workforce(InlineExecutor(), 1)

@@ -8,10 +8,10 @@ import pytest
 from bms.cell import CellState
 from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset
-from hil_sim.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
-from hil_sim.campaign.settings import CampaignSettings
-from hil_sim.disturbances import DisturbanceKind, disturbance_source
-from hil_sim.session import ControllerKind, Settings, run_both
+from hil_sim.plant.disturbances import DisturbanceKind, disturbance_source
+from hil_sim.run.session import ControllerKind, Settings, run_both
+from hil_sim.studies.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
+from hil_sim.studies.campaign.settings import CampaignSettings
 
 SEED = 5
 BLOCK = 500

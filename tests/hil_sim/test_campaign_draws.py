@@ -5,10 +5,10 @@ import pytest
 from scipy.stats import kstest, pearsonr
 
 from bms.presets import load_preset
-from hil_sim.campaign.draws import Family, draw
-from hil_sim.campaign.engine import limit_slope
-from hil_sim.campaign.noise import knot_blocks, streams
-from hil_sim.disturbances import DisturbanceKind
+from hil_sim.plant.disturbances import DisturbanceKind
+from hil_sim.studies.campaign.draws import Family, draw
+from hil_sim.studies.campaign.engine import limit_slope
+from hil_sim.studies.campaign.noise import knot_blocks, streams
 
 RUNS = 2000
 STEP_S = 0.01

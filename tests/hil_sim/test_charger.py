@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from bms.errors import InputError
 from bms.presets import load_preset
-from hil_sim.charger import Charger
+from hil_sim.plant.charger import Charger
 
 PRESET = load_preset("paper_calibrated")
 REFERENCE_A = PRESET.limits.reference_current_A

@@ -14,9 +14,9 @@ import pytest
 
 from bms.errors import InputError
 from bms.presets import load_preset
-from hil_sim.cost.counting import count
-from hil_sim.cost.measure import CostReport, measure_cost
-from hil_sim.cost.records import State, counts, period, restart, state
+from hil_sim.studies.cost.counting import count
+from hil_sim.studies.cost.measure import CostReport, measure_cost
+from hil_sim.studies.cost.records import State, counts, period, restart, state
 
 ROOT = Path(__file__).parents[2]
 FPU = "mps2-an386"

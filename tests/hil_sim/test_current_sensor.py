@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hil_sim.faults import parse_fault
-from hil_sim.session import Settings, run_both
+from hil_sim.run.session import Settings, run_both
 
 
 @pytest.mark.parametrize("offset_A", [-0.5, 0.3, 0.5])

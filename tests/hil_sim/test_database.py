@@ -9,8 +9,8 @@ from cantools import autosar
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil_sim.database import load_database
-from hil_sim.e2e import Receiver, Sender
+from hil_sim.bus.database import load_database
+from hil_sim.bus.e2e import Receiver, Sender
 
 ORACLE = cantools.database.load_string(files("codegen").joinpath("can/bms.dbc").read_text(), "dbc")
 CODECS = load_database()

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bms.presets import load_preset
-from hil_sim.disturbances import DisturbanceKind, disturbance_source
+from hil_sim.plant.disturbances import DisturbanceKind, disturbance_source
 
 STEP_S = 0.01
 KNOTS = 20_000

@@ -2,8 +2,9 @@
 
 import pytest
 
-from hil_sim.bus import Frame, open_bus
-from hil_sim.nodes.ecu import SYNC_ID, EcuNode
+from hil_sim.bus.buses import Frame, open_bus
+from hil_sim.bus.identifiers import SYNC_ID
+from hil_sim.nodes.ecu import EcuNode
 
 SYNC = Frame(SYNC_ID, b"")
 POLL_S = 0.01

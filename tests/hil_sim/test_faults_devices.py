@@ -9,11 +9,11 @@ import pytest
 
 from bms.cell import CellState
 from bms.errors import InputError
-from hil_sim.bus import Frame
-from hil_sim.database import load_database
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.database import load_database
 from hil_sim.faults import Injection, parse_fault
-from hil_sim.sensors import Readings
-from hil_sim.session import Settings, run_both, run_plant
+from hil_sim.plant.sensors import Readings
+from hil_sim.run.session import Settings, run_both, run_plant
 
 HEALTHY = Readings(-10.0, 3.3, 300.0, 299.0, 0.25)
 TRUTH = CellState(0.5, 303.0, 300.0, 299.0)

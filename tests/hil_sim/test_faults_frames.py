@@ -11,9 +11,9 @@ from cantools import autosar
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil_sim.bus import Frame
-from hil_sim.database import load_database
-from hil_sim.e2e import Sender
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.database import load_database
+from hil_sim.bus.e2e import Sender
 from hil_sim.faults import Injection, parse_fault
 from hil_sim.faults.frames import MessageName
 

@@ -12,11 +12,11 @@ import pytest
 from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
-from hil_sim.database import load_database
+from hil_sim.bus.database import load_database
+from hil_sim.fault_matrix.matrix import Expectation, fault_numbers, load_matrix, matrix_path
+from hil_sim.fault_matrix.runner import MatrixSettings, play, play_all
 from hil_sim.faults.frames import MessageFault
-from hil_sim.faults.matrix import Expectation, fault_numbers, load_matrix, matrix_path
 from hil_sim.faults.plan import KINDS
-from hil_sim.faults.runner import MatrixSettings, play, play_all
 from hil_sim.faults.sensors import SensorName
 from tests.hil_sim.command_line import bms
 

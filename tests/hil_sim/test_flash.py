@@ -15,7 +15,7 @@ from bms.errors import InputError
 from bms.firmware import Ecu
 from bms.image import MEMORY_MAP, calibration_part
 from bms.model.pair import load_pair
-from hil_sim.bus import Frame, open_bus
+from hil_sim.bus.buses import Frame, open_bus
 from hil_sim.targets import Emulation, Flash
 from tests.firmware.bench import HEALTHY, MEASURED, frame
 from tests.firmware.damaged_images import BOARD, damaged_images, resealed

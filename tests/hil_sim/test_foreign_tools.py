@@ -15,8 +15,8 @@ import pyte
 import pytest
 
 from hil_sim.logs import LogFrame, read_log
-from hil_sim.recorder import Recorder
-from hil_sim.session import Settings, run_both
+from hil_sim.logs.recorder import Recorder
+from hil_sim.run.session import Settings, run_both
 from tests.hil_sim.command_line import bms
 from tests.hil_sim.test_vcan import HAS_GUEST, HAS_VCAN, MISSING, run_in_guest
 

@@ -21,10 +21,10 @@ import pyte
 import pytest
 
 from bms.firmware import Ecu
-from hil_sim.bus import Frame, open_bus
+from hil_sim.bus.buses import Frame, open_bus
 from hil_sim.monitor.listener import ForeignFrame, Listener
 from hil_sim.nodes.ecu import EcuNode
-from hil_sim.session import Settings, run_plant
+from hil_sim.run.session import Settings, run_plant
 from tests.hil_sim.command_line import bms
 from tests.hil_sim.slcan_hub import FRAMES, SlcanHub
 

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bms.presets import load_preset
-from hil_sim.bus import Frame
-from hil_sim.e2e import Sender
-from hil_sim.identity import Identity
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.e2e import Sender
+from hil_sim.bus.identity import Identity
 from hil_sim.monitor.listener import ForeignFrame
 from hil_sim.monitor.model import Reading, SystemModel
 from hil_sim.monitor.presets import PresetFinder

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil_sim.bus import Frame
-from hil_sim.e2e import Sender
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.e2e import Sender
 from hil_sim.monitor import wording
 from hil_sim.monitor.bar import Bar
 from hil_sim.monitor.line import status_line

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from bms.cell import Disturbance
 from bms.presets import Preset
-from hil_sim.plant import SUB_STEPS, Extremes, Plant
+from hil_sim.plant.plant import SUB_STEPS, Extremes, Plant
 
 CALM = Disturbance()
 

@@ -5,13 +5,13 @@ import pytest
 
 from bms.errors import BusError
 from bms.firmware import ReceptionCounts
-from hil_sim.bus import Frame, open_bus
-from hil_sim.database import COUNTER_MODULUS
-from hil_sim.e2e import Sender
+from hil_sim.bus.buses import Frame, open_bus
+from hil_sim.bus.database import COUNTER_MODULUS
+from hil_sim.bus.e2e import Sender
+from hil_sim.logs.recorder import Recorder
 from hil_sim.nodes.plant import CONNECT_ATTEMPTS, PlantNode, Request
 from hil_sim.nodes.turns import LockStep
-from hil_sim.recorder import Recorder
-from hil_sim.sensors import Readings
+from hil_sim.plant.sensors import Readings
 
 READINGS = Readings(-1.0, 3.3, 300.0, 299.0, 1.0)
 PERIODS_TO_TRUST = 3

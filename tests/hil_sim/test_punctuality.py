@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil_sim.bus import Frame
-from hil_sim.e2e import Sender
-from hil_sim.nodes.ecu import MEASUREMENT_ID, PHASE_PERIODS, EcuNode
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.e2e import Sender
+from hil_sim.bus.identifiers import MEASUREMENT_ID
+from hil_sim.nodes.ecu import PHASE_PERIODS, EcuNode
 from hil_sim.nodes.plant import PlantNode, Request
+from hil_sim.nodes.punctuality import Slots, Spread
 from hil_sim.nodes.turns import LockStep, OnClock, PacedLockStep
-from hil_sim.punctuality import Slots, Spread
-from hil_sim.sensors import Readings
+from hil_sim.plant.sensors import Readings
 
 READINGS = Readings(-1.0, 3.3, 300.0, 299.0, 1.0)
 REQUEST = Request(charge=False, reference_current_A=-23.0, plug_in_soc=0.1)

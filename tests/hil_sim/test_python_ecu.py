@@ -6,12 +6,12 @@ import pytest
 
 from bms.baselines import BASELINES
 from bms.decision import NO_MARGINS, Decision
-from hil_sim.disturbances import DisturbanceKind, disturbance_source
-from hil_sim.e2e import Sender
-from hil_sim.plant import Plant
-from hil_sim.python_ecu import PythonEcu
-from hil_sim.session import ControllerKind, Settings, run_both
-from hil_sim.views import BusMeasurements, TrueState
+from hil_sim.bus.e2e import Sender
+from hil_sim.nodes.python_ecu import PythonEcu
+from hil_sim.nodes.views import BusMeasurements, TrueState
+from hil_sim.plant.disturbances import DisturbanceKind, disturbance_source
+from hil_sim.plant.plant import Plant
+from hil_sim.run.session import ControllerKind, Settings, run_both
 
 MEASURED = {
     "CellElectrical": {"Current": -10.0, "Voltage": 3.3},

@@ -6,8 +6,8 @@ import can
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil_sim.bus import Frame
-from hil_sim.recorder import Recorder
+from hil_sim.bus.buses import Frame
+from hil_sim.logs.recorder import Recorder
 
 entries = st.lists(
     st.tuples(st.integers(0, 0x7FF), st.binary(max_size=8), st.booleans()), min_size=1, max_size=20

@@ -9,15 +9,15 @@ from bms.errors import InputError
 from bms.firmware import Ecu
 from bms.model.model_file import load_model, shipped_model_path
 from bms.presets import load_preset, preset_path
-from hil_sim.database import load_database
+from hil_sim.bus.database import load_database
 from hil_sim.logs import LogFrame, LogWriter, read_log
-from hil_sim.recorder import Recorder
+from hil_sim.logs.recorder import Recorder
 from hil_sim.replay.comparison import compare
 from hil_sim.replay.engine import replay, write_replayed
 from hil_sim.replay.identity import choose_pair
 from hil_sim.replay.recording import load_recording
 from hil_sim.replay.signals import Signals
-from hil_sim.session import Settings, run_both, run_on_clocks
+from hil_sim.run.session import Settings, run_both, run_on_clocks
 from tests.hil_sim.golden.record import FOLDER
 
 START, LAGGED = FOLDER / "charge_start.log.gz", FOLDER / "lagged_model.log.gz"

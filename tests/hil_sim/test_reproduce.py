@@ -11,14 +11,14 @@ from bms.errors import InputError
 from bms.firmware import Ecu
 from bms.presets import load_preset
 from bms.studies.paper_fit.figures import FIGURES
-from hil_sim.disturbances import DisturbanceKind
-from hil_sim.reproduction.comparison import compare
-from hil_sim.reproduction.files import content_json, runs_csv
-from hil_sim.reproduction.margins import MARGINS, OURS_TOGETHER
-from hil_sim.reproduction.runs import Case, all_cases, run_case
-from hil_sim.reproduction.sections import BAD, passed, sections
-from hil_sim.result import RunResult
-from hil_sim.session import ControllerKind
+from hil_sim.plant.disturbances import DisturbanceKind
+from hil_sim.run.result import RunResult
+from hil_sim.run.session import ControllerKind
+from hil_sim.studies.reproduction.comparison import compare
+from hil_sim.studies.reproduction.files import content_json, runs_csv
+from hil_sim.studies.reproduction.margins import MARGINS, OURS_TOGETHER
+from hil_sim.studies.reproduction.runs import Case, all_cases, run_case
+from hil_sim.studies.reproduction.sections import BAD, passed, sections
 from tests.hil_sim.command_line import bms
 
 NAME = "paper_calibrated"

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bms.presets import load_preset
 from bms.presets.schema import Sensor, Sensors
-from hil_sim.sensors import Readings, SensorSuite
+from hil_sim.plant.sensors import Readings, SensorSuite
 
 SHIPPED = load_preset("paper_calibrated").sensors
 

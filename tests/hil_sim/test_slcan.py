@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bms.errors import BusError
-from hil_sim.bus import Frame, open_bus, open_interface
-from hil_sim.slcan import _message
+from hil_sim.bus.buses import Frame, open_bus, open_interface
+from hil_sim.bus.slcan import _message
 from tests.hil_sim.lines import Line, frame, text
 
 SYNC = Frame(0x080, b"")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from hil_sim.disturbances import DisturbanceKind
 from hil_sim.faults import parse_fault
-from hil_sim.session import Settings, run_both
+from hil_sim.plant.disturbances import DisturbanceKind
+from hil_sim.run.session import Settings, run_both
 
 SURFACE_DEFICIT, OUT_OF_DOMAIN, CORE_TOO_HOT = 19, 10, 14
 

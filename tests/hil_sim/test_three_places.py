@@ -19,8 +19,8 @@ from bms.errors import BusError, InputError
 from bms.firmware import Ecu
 from bms.model.model_file import shipped_model_path
 from bms.model.pair import load_pair
-from hil_sim.bus import Frame, open_bus
-from hil_sim.faults.runner import MatrixSettings
+from hil_sim.bus.buses import Frame, open_bus
+from hil_sim.fault_matrix.runner import MatrixSettings
 from hil_sim.replay.engine import replay
 from hil_sim.targets.agreement import compare_targets
 from hil_sim.targets.catalog import NAMES, LinuxTarget, QemuTarget

@@ -19,17 +19,17 @@ import numpy as np
 from bms.firmware import Ecu
 from bms.model.model_file import shipped_model_path
 from bms.presets import load_preset
-from hil_sim.bus import open_bus
-from hil_sim.charger import Charger
-from hil_sim.database import load_database
-from hil_sim.disturbances import DisturbanceKind, disturbance_source
+from hil_sim.bus.buses import open_bus
+from hil_sim.bus.database import load_database
 from hil_sim.faults import Injection, parse_fault
+from hil_sim.logs.recorder import Recorder
 from hil_sim.nodes.ecu import EcuNode
 from hil_sim.nodes.plant import PlantNode, Request
 from hil_sim.nodes.turns import LockStep
-from hil_sim.plant import SUB_STEPS, Plant
-from hil_sim.recorder import Recorder
-from hil_sim.sensors import Readings, SensorSuite
+from hil_sim.plant.charger import Charger
+from hil_sim.plant.disturbances import DisturbanceKind, disturbance_source
+from hil_sim.plant.plant import SUB_STEPS, Plant
+from hil_sim.plant.sensors import Readings, SensorSuite
 
 FOLDER = Path(__file__).parent
 SEED = 5

@@ -1,0 +1,1 @@
+"""The CAN network: connections, messages of the database, their protection."""

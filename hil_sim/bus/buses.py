@@ -1,0 +1,157 @@
+"""CAN buses by name, `interface:channel` in python-can's terms, carrying classical data frames."""
+
+from __future__ import annotations
+
+import logging
+import socket
+from typing import Any, NamedTuple
+
+import can
+from can.interfaces.socketcan import SocketcanBus
+
+from bms.errors import BusError, InputError
+from hil_sim.bus.closing import Closing
+from hil_sim.bus.slcan import SCHEME, SlcanSocketBus
+
+RECEIVE_BUFFER_BYTES = 1 << 20
+_STANDARD_FRAMES = [{"can_id": 0, "can_mask": 0, "extended": False}]
+
+# udp_multicast: one hop more would send the frames out of the machine's network card.
+# slcan: an adapter needs no start-up time unless it has a boot loader of its own.
+_QUIRKS: dict[str, dict[str, Any]] = {
+    "udp_multicast": {"hop_limit": 0},
+    "slcan": {"sleep_after_open": 0.0, "timeout": 0.001, "bitrate": 500_000},
+}
+
+# What an adapter has to say when it cannot be opened is in the exception already.
+logging.getLogger("can").addHandler(logging.NullHandler())
+
+
+class Frame(NamedTuple):
+    """A data frame with an 11-bit identifier."""
+
+    frame_id: int
+    data: bytes
+
+
+class _Message(can.Message):
+    """A message that nobody changes, so that the virtual bus needs no copy for every receiver."""
+
+    __slots__ = ()
+
+    def __deepcopy__(self, memo: dict[int, Any] | None) -> can.Message:
+        return self
+
+
+class CanBus(Closing):
+    """An open bus; frames other than classical 11-bit data frames are not seen."""
+
+    def __init__(self, name: str, bus: can.BusABC) -> None:
+        self.name = name
+        self._bus = bus
+
+    def send(self, frame: Frame) -> None:
+        """Put a frame on the bus; BusError when the bus does not take it."""
+        message = _Message(arbitration_id=frame.frame_id, data=frame.data, is_extended_id=False)
+        try:
+            self._bus.send(message)
+        except (can.CanError, OSError) as error:
+            raise BusError(f"bus '{self.name}': cannot send: {one_line(error)}") from None
+
+    def receive(self, timeout_s: float) -> Frame | None:
+        """The next frame of another party, or None after timeout_s; BusError when the bus fails."""
+        try:
+            while (message := self._bus.recv(timeout_s)) is not None:
+                if not (message.is_remote_frame or message.is_error_frame or message.is_fd):
+                    return Frame(message.arbitration_id, bytes(message.data))
+        except (can.CanError, OSError) as error:
+            raise BusError(f"bus '{self.name}': cannot receive: {one_line(error)}") from None
+        return None
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._bus.shutdown()
+
+
+def open_bus(name: str) -> CanBus:
+    """Open a bus such as virtual:bms, socketcan:vcan0 or slcan:socket://127.0.0.1:5000.
+
+    Raises BusError in one line with a remedy when the name or the bus behind it is no good.
+    """
+    return CanBus(name, open_interface(name, can_filters=_STANDARD_FRAMES))
+
+
+def open_interface(name: str, **options: Any) -> can.BusABC:
+    """python-can's bus of that name, with these options of its own; BusError as in open_bus."""
+    interface, colon, channel = name.partition(":")
+    if not (colon and interface and channel):
+        raise BusError(f"bus '{name}': not interface:channel; write for example virtual:bms")
+    try:
+        if interface == "slcan" and channel.startswith(SCHEME):
+            return SlcanSocketBus(channel, **options)
+        bus = can.Bus(
+            interface=interface,
+            channel=channel,
+            ignore_config=True,
+            **{**_QUIRKS.get(interface, {}), **options},
+        )
+    except Exception as error:  # every adapter behind python-can has exceptions of its own
+        raise BusError(
+            f"bus '{name}': cannot be opened ({one_line(error)}); {_remedy(interface)}"
+        ) from None
+    if isinstance(bus, SocketcanBus):
+        bus.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+    return bus
+
+
+def require_shared(name: str) -> None:
+    """Raise InputError for a bus on which only parties in one process can meet."""
+    if name.startswith("virtual:"):
+        raise InputError(
+            f"bus '{name}': reaches parties in one process only; use 'bms sil', "
+            "or a bus such as socketcan:vcan0 for two processes"
+        )
+
+
+def is_line(name: str) -> bool:
+    """Whether the bus is a line with one end here, so that an ECU can only be at the other one."""
+    return name.startswith(f"slcan:{SCHEME}")
+
+
+def require_room_for_ecu(name: str) -> None:
+    """Raise InputError for a line or an adapter, which plant and ECU cannot share."""
+    if name.startswith("slcan:") and not is_line(name):
+        raise InputError(
+            f"bus '{name}': one adapter is one party; use 'bms plant', and 'bms ecu' or the ECU at "
+            "another adapter, or a bus such as virtual:bms"
+        )
+    if is_line(name):
+        raise InputError(
+            f"bus '{name}': has one end here, and the ECU is at the other; use 'bms sil' or "
+            "'bms plant', or a bus such as virtual:bms"
+        )
+
+
+def ecu_remedy(name: str) -> str:
+    """What to do when no ECU answers on a bus."""
+    if is_line(name):
+        return "see that an image with this firmware runs at its other end; 'make pil' starts one"
+    return f"start 'bms ecu --bus {name}'"
+
+
+def _remedy(interface: str) -> str:
+    if interface == "socketcan":
+        return (
+            "use virtual:bms, or run the command inside tools/vcan_guest.sh, "
+            "which provides socketcan:vcan0"
+        )
+    if interface == "slcan":
+        return "see that an image or adapter listens there, or use virtual:bms"
+    if interface not in can.VALID_INTERFACES:
+        return "choose an interface that python-can knows, for example virtual:bms"
+    return "check that the adapter is there and its driver installed, or use virtual:bms"
+
+
+def one_line(error: Exception) -> str:
+    """What an exception says, in one line."""
+    return " ".join(str(error).split()) or type(error).__name__

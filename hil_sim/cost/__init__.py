@@ -1,5 +1,0 @@
-"""What estimate, decision and a control period cost on a microcontroller, in instructions."""
-
-from hil_sim.cost.measure import Cost, CostReport, measure_cost
-
-__all__ = ["Cost", "CostReport", "measure_cost"]

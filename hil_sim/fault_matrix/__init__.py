@@ -1,0 +1,1 @@
+"""The list of faults with the reaction that each must have, played and judged."""

@@ -1,0 +1,1 @@
+"""What is charged and what charges it: cell, sensors, charger, disturbances."""

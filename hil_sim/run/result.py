@@ -1,0 +1,169 @@
+"""What a run leaves behind: time series and the summary with stable keys."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from bms.cell import CellState
+from bms.firmware import ReceptionCounts
+from hil_sim.faults.injection import InjectedFault
+from hil_sim.nodes.line_losses import LineLosses
+from hil_sim.nodes.plant import Answer
+from hil_sim.nodes.punctuality import PlantWatch, Timing
+
+
+@dataclass
+class TimeSeries:
+    """One entry a control period; the time is 0 at the start of the charge.
+
+    Temperatures and state of charge are true values at the start of the period, current and
+    voltage those that the charger applies from then on. The estimate is None where the ECU gave
+    none.
+    """
+
+    time_s: list[float] = field(default_factory=list)
+    current_A: list[float] = field(default_factory=list)
+    voltage_V: list[float] = field(default_factory=list)
+    soc: list[float] = field(default_factory=list)
+    core_temperature_K: list[float] = field(default_factory=list)
+    surface_temperature_K: list[float] = field(default_factory=list)
+    coolant_temperature_K: list[float] = field(default_factory=list)
+    command_A: list[float | None] = field(default_factory=list)
+    usable_command_A: list[float | None] = field(default_factory=list)
+    """What of it the charger may use."""
+    estimated_core_temperature_K: list[float | None] = field(default_factory=list)
+    estimated_soc: list[float | None] = field(default_factory=list)
+    state: list[str | None] = field(default_factory=list)
+    active_constraint: list[str | None] = field(default_factory=list)
+    feasible: list[bool | None] = field(default_factory=list)
+    latched_faults: list[int | None] = field(default_factory=list)
+
+    def append(
+        self, time_s: float, state: CellState, current_A: float, voltage_V: float, answer: Answer
+    ) -> None:
+        """Add a period: what is true at its start, and what the ECU answered."""
+        self.time_s.append(time_s)
+        self.current_A.append(current_A)
+        self.voltage_V.append(voltage_V)
+        self.soc.append(state.soc)
+        self.core_temperature_K.append(state.core_temperature_K)
+        self.surface_temperature_K.append(state.surface_temperature_K)
+        self.coolant_temperature_K.append(state.coolant_temperature_K)
+        self.command_A.append(answer.command_A)
+        self.usable_command_A.append(answer.usable_command_A)
+        self.estimated_core_temperature_K.append(answer.value("CoreTemperature"))
+        self.estimated_soc.append(answer.value("StateOfCharge"))
+        self.state.append(answer.state)
+        self.active_constraint.append(answer.active_constraint)
+        self.feasible.append(answer.feasible)
+        latched = answer.value("LatchedFaults")
+        self.latched_faults.append(None if latched is None else int(latched))
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Figures of a run. The first thirteen are a stable interface; None where there is none."""
+
+    controller: str
+    preset: str
+    bus: str
+    steps: int
+    max_core_temperature_K: float
+    max_surface_temperature_K: float
+    max_voltage_V: float
+    final_soc: float
+    charge_time_s: float | None
+    first_derate_s: float | None
+    kan_rmse_K: float | None
+    kan_max_abs_error_K: float | None
+    wall_time_s: float
+    max_soc: float
+    limits_kept: bool
+    violations: tuple[str, ...]
+    stop_reason: str
+    first_fault: int | None
+    infeasible_steps: int
+    error_bound_K: float | None
+    seed: int
+    disturbance: str
+    realtime: bool
+    model_hash: str | None
+    preset_hash: str
+    command_reception: ReceptionCounts
+    """Charge commands that the charger refused, or missed as far as the next counter shows."""
+    faults: tuple[InjectedFault, ...] = ()
+    timing: Timing | None = None
+    line_losses: LineLosses | None = None
+    """Frames lost on the serial line to the ECU; None where there is no such line."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain mapping in the order of the fields."""
+        content = asdict(self)
+        return {**content, "violations": list(self.violations), "faults": list(content["faults"])}
+
+    @property
+    def failures(self) -> list[str]:
+        """What is wrong with the run, one text each."""
+        reasons = list(self.violations)
+        if self.line_losses is not None and self.line_losses.total:
+            reasons.append(str(self.line_losses))
+        if self.stop_reason not in (STOP_COMPLETE, STOP_TIME_LIMIT):
+            fault = "" if self.first_fault is None else f" {self.first_fault} (monitor.h)"
+            reasons.append(f"run ended by {self.stop_reason}{fault}")
+        return reasons
+
+    @property
+    def passed(self) -> bool:
+        """Whether every limit was kept and the charge did not end in a fault or in silence."""
+        return not self.failures
+
+
+STOP_COMPLETE, STOP_TIME_LIMIT = "complete", "time-limit"
+STOP_FAULT, STOP_SILENT = "fault", "ecu-silent"
+
+DERATED_STATE = "derated"
+CHARGING_STATES = ("charging", DERATED_STATE)
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """A finished run."""
+
+    summary: Summary
+    series: TimeSeries
+    watch: PlantWatch | None = None
+    """Every time behind the summary's timing; None where time was virtual."""
+
+
+def first_derate_s(series: TimeSeries) -> float | None:
+    """First time in s at which a constraint allowed less than was asked for."""
+    derated = (t for t, state in zip(series.time_s, series.state) if state == DERATED_STATE)
+    return next(derated, None)
+
+
+def infeasible_steps(series: TimeSeries) -> int:
+    """Control periods of the charge in which the constraints left no current but 0 A."""
+    return sum(
+        feasible is False and state in CHARGING_STATES
+        for feasible, state in zip(series.feasible, series.state)
+    )
+
+
+def estimate_errors_K(series: TimeSeries) -> list[float]:
+    """Estimated less true core temperature (K) in every period of the charge with an estimate."""
+    return [
+        estimate - truth
+        for time_s, estimate, truth in zip(
+            series.time_s, series.estimated_core_temperature_K, series.core_temperature_K
+        )
+        if estimate is not None and time_s >= 0.0
+    ]
+
+
+def rmse_K(errors_K: list[float]) -> float | None:
+    """Root of the mean square, None for no errors."""
+    if not errors_K:
+        return None
+    return math.sqrt(math.fsum(error * error for error in errors_K) / len(errors_K))

@@ -1,0 +1,66 @@
+"""What a simulation spends its time on: a sample of the stack every millisecond."""
+
+from __future__ import annotations
+
+import signal
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from types import FrameType
+
+INTERVAL_S = 0.001
+
+LAYERS: Mapping[str, tuple[str, ...]] = {
+    "cell model": ("bms/cell/", "hil_sim/plant/plant.py", "hil_sim/plant/disturbances.py"),
+    "bus (python-can)": ("hil_sim/bus/buses.py",),
+    "codec and protection of the plant": (
+        "hil_sim/bus/database.py",
+        "hil_sim/bus/e2e.py",
+        "hil_sim/nodes/plant.py",
+    ),
+    "recording": ("hil_sim/logs/recorder.py", "hil_sim/logs/"),
+    "firmware and its node": ("bms/firmware/", "hil_sim/nodes/ecu.py"),
+    "sensors": ("hil_sim/plant/sensors.py",),
+}
+REST = "rest"
+
+
+class LayerCounts:
+    """How often each layer was at work; a sample belongs to the innermost layer on the stack."""
+
+    def __init__(self) -> None:
+        self._samples: Counter[str] = Counter()
+
+    def note(self, frame: FrameType | None) -> None:
+        """Count one sample."""
+        while frame is not None:
+            path = frame.f_code.co_filename.replace("\\", "/")
+            for layer, parts in LAYERS.items():
+                if any(part in path for part in parts):
+                    self._samples[layer] += 1
+                    return
+            frame = frame.f_back
+        self._samples[REST] += 1
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._samples.clear()
+
+    @property
+    def shares_percent(self) -> dict[str, float]:
+        """Share of the time by layer, largest first."""
+        total = sum(self._samples.values())
+        return {name: 100.0 * n / total for name, n in self._samples.most_common()}
+
+
+@contextmanager
+def sampled() -> Iterator[LayerCounts]:
+    """Take samples of the main thread meanwhile, by the wall clock, so that waiting counts too."""
+    counts = LayerCounts()
+    before = signal.signal(signal.SIGALRM, lambda _, frame: counts.note(frame))
+    signal.setitimer(signal.ITIMER_REAL, INTERVAL_S, INTERVAL_S)
+    try:
+        yield counts
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

@@ -1,0 +1,154 @@
+"""A benchmark's result as tables on the terminal."""
+
+from __future__ import annotations
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from hil_sim.studies.bench.aims import aims
+from hil_sim.studies.bench.race import Absent, Timed
+from hil_sim.studies.bench.run import Result
+from hil_sim.studies.bench.throughput import growth
+
+_CAMPAIGN_HEADINGS = ("runs", "runs a second", "a run takes", "wall time", "processes")
+_TITLES = {
+    "estimate": "Core temperature: one estimate",
+    "perceptron": "For comparison: a perceptron of as many parameters",
+    "decision": "Charging current: one decision",
+    "period": "ECU: one control period, messages in, step, messages out",
+}
+
+
+def print_tables(console: Console, result: Result) -> None:
+    """Every section that was run, then the aims."""
+    machine = result.machine
+    pinned = "" if result.core is None else f"; timed on core {result.core} alone, one thread"
+    console.print(
+        f"{escape(machine.cpu)}, {machine.cores} cores, {machine.system}, Python {machine.python}"
+        f"{pinned}; load average at the start {machine.load_average:.2f}",
+        soft_wrap=True,
+    )
+    _print_packages(console, result)
+    c_ns = None
+    for section, title in _TITLES.items():
+        rows: list[Timed | Absent] = getattr(result, section)
+        if rows:
+            if section != "perceptron":
+                c_ns = rows[0].time_ns.median if isinstance(rows[0], Timed) else None
+            console.print(_ways(title, rows, c_ns))
+    for speed in result.simulation:
+        if speed.not_run:
+            console.print(f"not run: {speed.bus}: {speed.not_run}", soft_wrap=True, markup=False)
+    if any(speed.times_real_time for speed in result.simulation):
+        console.print(_simulation(result))
+        console.print(_layers(result))
+    if result.campaign:
+        console.print(_campaign(result))
+    reached = list(aims(result))
+    if reached:
+        console.print(_aims(result))
+
+
+def _table(title: str, *headings: str) -> Table:
+    table = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0))
+    for number, heading in enumerate(headings):
+        table.add_column(heading, justify="right" if number else "left", no_wrap=True)
+    return table
+
+
+def _ways(title: str, rows: list[Timed | Absent], c_ns: float | None) -> Table:
+    table = _table(title, "", "median", "quartiles", "times C")
+    for row in rows:
+        if isinstance(row, Timed):
+            spread = row.time_ns
+            table.add_row(
+                escape(row.name),
+                _time(spread.median),
+                f"{_time(spread.low)} .. {_time(spread.high)}",
+                "" if c_ns is None else _ratio(spread.median / c_ns),
+            )
+    return table
+
+
+def _print_packages(console: Console, result: Result) -> None:
+    rows = [row for section in _TITLES for row in getattr(result, section)]
+    timed = [row for row in rows if isinstance(row, Timed)]
+    if timed:
+        packages = dict.fromkeys(row.package for row in timed)
+        console.print(
+            f"{result.states} states of one charge, answers compared before timing; medians of "
+            f"{timed[0].time_ns.repetitions} repetitions; {', '.join(packages)}",
+            soft_wrap=True,
+            markup=False,
+        )
+    for row in rows:
+        if isinstance(row, Absent):
+            console.print(f"not run: {row.name}: {row.reason}", soft_wrap=True, markup=False)
+
+
+def _ratio(ratio: float) -> str:
+    return f"{ratio:,.0f}" if ratio >= 10 else f"{ratio:.2g}"
+
+
+def _time(time_ns: float) -> str:
+    for unit, factor in (("ms", 1e6), ("µs", 1e3)):
+        if time_ns >= factor:
+            return f"{time_ns / factor:.3g} {unit}"
+    return f"{time_ns:.3g} ns"
+
+
+def _simulation(result: Result) -> Table:
+    title = "Simulation of a charge in lock step, with protection and recording"
+    table = _table(title, "bus", "x real time", "quartiles", "processor", "periods", "parties")
+    for speed in result.simulation:
+        spread = speed.times_real_time
+        if spread is not None:
+            table.add_row(
+                speed.bus,
+                f"{spread.median:.0f}",
+                f"{spread.low:.0f} .. {spread.high:.0f}",
+                f"{speed.processor_share_percent:.0f} %",
+                f"{spread.repetitions} x {speed.periods}",
+                speed.parties,
+            )
+    return table
+
+
+def _layers(result: Result) -> Table:
+    speeds = [speed for speed in result.simulation if speed.layer_shares_percent]
+    table = _table(
+        "What the plant's process spends that time on, in %", "", *(s.bus for s in speeds)
+    )
+    names = dict.fromkeys(name for speed in speeds for name in speed.layer_shares_percent)
+    for name in names:
+        shares = [speed.layer_shares_percent.get(name, 0.0) for speed in speeds]
+        table.add_row(name, *(f"{share:.0f}" for share in shares))
+    return table
+
+
+def _campaign(result: Result) -> Table:
+    table = _table("Campaign, each run with three controllers", *_CAMPAIGN_HEADINGS)
+    for row, relative in zip(result.campaign, growth(result.campaign)):
+        table.add_row(
+            f"{row.runs}",
+            f"{row.runs_per_s:.1f}",
+            f"{relative:.2f} of the first",
+            f"{row.wall_time_s:.1f} s",
+            f"{row.jobs}",
+        )
+    return table
+
+
+def _aims(result: Result) -> Table:
+    table = _table("Aims", "", "measured", "wanted", "")
+    for aim in aims(result):
+        sign, unit = ("at most", " ns") if aim.unit == "ns" else ("at least", " x")
+        table.add_row(
+            aim.name,
+            f"{aim.measured:,.0f}{unit}",
+            f"{sign} {aim.wanted:,.0f}{unit}",
+            "reached" if aim.is_reached else "[red]missed[/red]",
+        )
+    return table

@@ -1,0 +1,187 @@
+"""Charges in C: one object for one charge, stepped in blocks of control periods."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from bms.arrays import Array
+from bms.barrier import barrier_constants
+from bms.baselines.cc_cv import CUT_BACK_SPAN_K
+from bms.baselines.measured_cell import charging_voltage_V
+from bms.calibration import calibration_fields
+from bms.cell import CellParameters, CellState
+from bms.presets import Preset
+from bms.presets.schema import Sensor
+from codegen.can_database import load_database
+from hil_sim.plant.sensors import Readings
+from hil_sim.run.charge import OFF_PERIODS, READY_PERIODS, STARTING_PERIODS
+from hil_sim.studies.campaign._runner import ffi, lib
+from hil_sim.studies.campaign.settings import CampaignSettings
+
+SUB_STEPS: int = lib.CHARGE_SUB_STEPS
+CONTROLLERS = {
+    "kan-rcbf": lib.CHARGE_KAN_RCBF,
+    "s-cbf": lib.CHARGE_S_CBF,
+    "cc-cv": lib.CHARGE_CC_CV,
+}
+"""Controllers that a campaign counts side by side, with their numbers in C."""
+OUTCOMES = ("running", "complete", "fault", "time-limit", "not-ready")
+
+_READING_SIGNALS = (
+    "Current",
+    "Voltage",
+    "SurfaceTemperature",
+    "CoolantTemperature",
+    "CoolingPower",
+)
+
+
+class Scenario:
+    """What all charges of a campaign share: sensors, bus, controllers, the firmware's tables."""
+
+    def __init__(self, settings: CampaignSettings) -> None:
+        """Raises InputError or ModelMismatchError as bms.tables.calibration_fields does."""
+        preset = settings.preset
+        self.preset = preset
+        self.calibration = ffi.new(
+            "bms_calibration_t *",
+            calibration_fields(preset, settings.model, settings.firmware_changes),
+        )
+        self.fields = ffi.new(
+            "charge_scenario_t *",
+            {
+                "period_s": preset.timing.sampling_period_s,
+                "max_time_s": settings.max_time_s,
+                "reference_current_A": preset.limits.reference_current_A,
+                "completion_soc": preset.limits.completion_soc,
+                "noise_cutoff": Sensor.NOISE_CUTOFF,
+                "off_periods": OFF_PERIODS,
+                "ready_periods": READY_PERIODS,
+                "starting_periods": STARTING_PERIODS,
+                "nominal": _cell(preset.cell),
+                "sensors": [asdict(getattr(preset.sensors, name)) for name in Readings._fields],
+                "signals": _signals(),
+                "baselines": _baselines(preset),
+            },
+        )
+
+
+class CampaignCharge:
+    """One cell on one controller; `fields` is the C structure with everything that is known."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        controller: str,
+        cell: CellParameters,
+        state: CellState,
+        cooling_power_W: float,
+        first_knot: Array,
+    ) -> None:
+        """The first knot is the disturbance at the beginning, (4,)."""
+        self._scenario = scenario
+        self.fields: Any = ffi.new(
+            "charge_t *",
+            {
+                "scenario": scenario.fields,
+                "controller": CONTROLLERS[controller],
+                "cell": _cell(cell),
+                "cooling_power_W": cooling_power_W,
+                "state": tuple(state),
+                "knot": tuple(map(float, first_knot)),
+            },
+        )
+        lib.charge_begin(self.fields, scenario.calibration)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the charge has come to an end."""
+        return bool(self.fields.outcome != lib.CHARGE_RUNNING)
+
+    @property
+    def outcome(self) -> str:
+        """How it ended, one of OUTCOMES."""
+        return OUTCOMES[self.fields.outcome]
+
+    def advance(self, normals: Array, knots: Array) -> None:
+        """Run n periods or to the end: standard normals (n, 5), knots (n SUB_STEPS, 4)."""
+        if normals.shape[1:] != (5,) or knots.shape != (len(normals) * SUB_STEPS, 4):
+            raise ValueError("normals must have shape (n, 5) and knots (n * SUB_STEPS, 4)")
+        lib.charge_advance(self.fields, _doubles(normals), _doubles(knots), len(normals))
+
+
+def limit_slope(knots: Array, before: float, largest_change: float) -> None:
+    """Make the surface disturbance of knots (n, 4) change by at most largest_change a knot."""
+    lib.charge_limit_slope(
+        ffi.from_buffer("double[]", knots, require_writable=True),
+        len(knots),
+        before,
+        largest_change,
+    )
+
+
+def _doubles(values: Array) -> Any:
+    return ffi.from_buffer("double[]", np.ascontiguousarray(values, dtype=np.float64))
+
+
+def _cell(cell: CellParameters) -> dict[str, Any]:
+    names = (
+        "capacity_As",
+        "core_resistance_K_per_W",
+        "core_heat_capacity_J_per_K",
+        "surface_resistance_K_per_W",
+        "surface_heat_capacity_J_per_K",
+        "coolant_heat_capacity_J_per_K",
+        "ohmic_resistance_ohm",
+        "entropic_coefficient_V_per_K",
+    )
+    return {name: getattr(cell, name) for name in names} | {
+        "ocv_points": len(cell.ocv.soc),
+        "ocv_soc": cell.ocv.soc,
+        "ocv_V": cell.ocv.voltage_V,
+    }
+
+
+def _signals() -> dict[str, Any]:
+    signals = {
+        signal.name: {
+            "scale": signal.scale,
+            "offset": signal.offset,
+            "lowest": round((signal.minimum - signal.offset) / signal.scale),
+            "highest": round((signal.maximum - signal.offset) / signal.scale),
+        }
+        for message in load_database().messages
+        for signal in message.signals
+        if signal.minimum is not None and signal.maximum is not None
+    }
+    return {
+        "readings": [signals[name] for name in _READING_SIGNALS],
+        "reference_current": signals["ReferenceCurrent"],
+        "plug_in_soc": signals["PlugInStateOfCharge"],
+        "command_current": signals["CommandCurrent"],
+    }
+
+
+def _baselines(preset: Preset) -> dict[str, float]:
+    cell, limits, gains = preset.cell, preset.limits, preset.gains
+    constants = barrier_constants(cell, preset)
+    return {
+        "strongest_current_A": limits.reference_current_A,
+        "capacity_As": cell.capacity_As,
+        "ohmic_resistance_ohm": cell.ohmic_resistance_ohm,
+        "max_voltage_V": limits.max_voltage_V,
+        "max_soc": limits.max_soc,
+        "max_surface_temperature_K": limits.max_surface_temperature_K,
+        "alpha1_per_s": gains.alpha1_per_s,
+        "alpha3_per_s2": gains.alpha3_per_s2,
+        "a4_per_s2": constants.a4_per_s2,
+        "a6_per_s2": constants.a6_per_s2,
+        "a9_K_per_A2s2": constants.a9_K_per_A2s2,
+        "a10_K_per_Ws2": constants.a10_K_per_Ws2,
+        "charging_voltage_V": charging_voltage_V(preset),
+        "cut_back_begin_K": limits.max_surface_temperature_K - CUT_BACK_SPAN_K,
+        "cut_back_end_K": limits.max_surface_temperature_K,
+    }

@@ -1,0 +1,92 @@
+/* One charge in closed loop, as hil_sim/run/charge.py runs it over a bus: plant, sensors, charger and
+ * controller. Random numbers come from the caller. */
+#ifndef CHARGE_H
+#define CHARGE_H
+
+#include "baselines.h"
+#include "cell.h"
+#include "ecu_link.h"
+
+#define CHARGE_SUB_STEPS 10
+
+typedef enum {
+    CHARGE_RUNNING = 0,
+    CHARGE_COMPLETE = 1,
+    CHARGE_FAULT = 2,
+    CHARGE_TIME_LIMIT = 3,
+    CHARGE_NOT_READY = 4
+} charge_outcome_t;
+
+typedef enum { CHARGE_KAN_RCBF = 0, CHARGE_S_CBF = 1, CHARGE_CC_CV = 2 } charge_controller_t;
+
+/* reading = round(truth + bias + noise) to the resolution; 0 means no rounding */
+typedef struct {
+    double resolution;
+    double noise_std;
+    double bias;
+} charge_sensor_t;
+
+/* What all runs of a campaign have in common. */
+typedef struct {
+    double period_s;
+    double max_time_s;
+    double reference_current_A;
+    double completion_soc;
+    double noise_cutoff; /* of the standard normal numbers */
+    uint32_t off_periods;   /* before the charge is requested */
+    uint32_t ready_periods; /* after which an ECU that is not ready is given up */
+    uint32_t starting_periods; /* the same while it says that it is still starting */
+    cell_t nominal;         /* the cell that the controllers know */
+    charge_sensor_t sensors[LINK_READINGS];
+    link_signals_t signals;
+    baseline_constants_t baselines;
+} charge_scenario_t;
+
+/* Largest values of a charge, at any sub-step. */
+typedef struct {
+    double core_temperature_K;
+    double surface_temperature_K;
+    double voltage_V;
+    double soc;
+    double estimate_error_K;     /* of the firmware, while charging, at the control periods */
+    cell_state_t model_error;    /* |true less nominal rates|, disturbance included */
+    double surface_error_slope_K_per_s2;
+} charge_peaks_t;
+
+typedef struct {
+    const charge_scenario_t *scenario;
+    charge_controller_t controller;
+    cell_t cell;
+    double cooling_power_W;
+    double plug_in_soc;
+    cell_state_t state;
+    cell_state_t knot; /* disturbance at the present instant */
+    double current_A;
+    charge_outcome_t outcome;
+    uint32_t periods;
+    bool requested;
+    uint32_t edge_period;  /* of the first request */
+    double time_s;         /* of the last decision, since the edge */
+    double first_derate_s; /* negative: never */
+    uint32_t first_fault;  /* FAULT_NONE: none */
+    uint32_t infeasible_periods;
+    double surface_error_K_per_s; /* at the last sub-step; NaN before the first */
+    double counted_soc;           /* by CC-CV, from its measurements */
+    charge_peaks_t peaks;
+    link_t link;
+} charge_t;
+
+/* Prepares a charge whose scenario, controller, cell, cooling_power_W, state and knot are set and
+ * whose other members are zero. The calibration is the firmware's and must outlive the charge. */
+void charge_begin(charge_t *charge, const bms_calibration_t *calibration);
+
+/* Runs up to `periods` control periods, with LINK_READINGS standard normal numbers for each and
+ * the disturbance (soc, core, surface, coolant) at the end of each of its CHARGE_SUB_STEPS
+ * sub-steps. */
+void charge_advance(charge_t *charge, const double *normals, const double *knots,
+                    uint32_t periods);
+
+/* Makes the surface disturbance change by no more than largest_change from knot to knot. */
+void charge_limit_slope(double *knots, uint32_t count, double before, double largest_change);
+
+#endif
