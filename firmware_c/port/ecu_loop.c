@@ -98,7 +98,7 @@ void ecu_loop_init(ecu_loop_t *loop, const bms_calibration_t *calibration)
 {
     const bms_config_t config = { calibration };
     bms_init(&loop->bms, &config);
-    loop->period_ms = (loop->bms.studies.paper_fit != NULL)
+    loop->period_ms = (loop->bms.calibration != NULL)
                           ? (uint32_t)(calibration->sampling_period_s * MS_PER_S + 0.5f)
                           : DEFAULT_PERIOD_MS;
     loop->due_ms = 0u;
