@@ -24,6 +24,6 @@ three-places: .venv/tests ## Hold native process and Cortex-M images against the
 	$(MAKE) --no-print-directory firmware
 	$(BIN)/bms compare-targets $(if $(ROWS),--rows '$(ROWS)')
 
-.venv/firmware: .venv/runtime tools/debian_packages.sh
+.venv/firmware: .venv/runtime build/extensions tools/debian_packages.sh
 	tools/debian_packages.sh firmware
 	touch $@

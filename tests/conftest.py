@@ -11,12 +11,16 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from bms.native_build import FIRMWARE
+from bms.studies.rivals.native_build import RIVALS
+from hil_sim.studies.campaign.native_build import RUNNER
+
 # The machine may be busy with other tests; time is measured in benchmarks only.
 settings.register_profile("no_deadline", deadline=None)
 settings.load_profile("no_deadline")
 
 Command = Callable[..., tuple[int, str, str]]
-EXTENSION = "bms.firmware._firmware"
+EXTENSION = FIRMWARE.module
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -28,10 +32,20 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Put the variant in the place of the installed extension before anybody imports that."""
+    """Put a variant in the place of the installed extension; refuse extensions of other sources."""
     folder = config.getoption("--firmware-build")
-    if folder is None:
-        return
+    if folder is not None:
+        _use_variant(folder)
+    for extension in (RIVALS, RUNNER) if folder is not None else (FIRMWARE, RIVALS, RUNNER):
+        if extension.is_stale(import_module(extension.module)):
+            raise pytest.UsageError(
+                f"{extension.module} was built from other C sources than lie here now; "
+                "run 'make build'"
+            )
+
+
+def _use_variant(folder: Path) -> None:
+    """Before anybody imports the installed one."""
     (path,) = (folder / "bms" / "firmware").glob("_firmware*.so")
     spec = spec_from_file_location(EXTENSION, path.resolve())
     assert spec is not None and spec.loader is not None
