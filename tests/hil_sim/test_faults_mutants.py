@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +9,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from tests.firmware.mutation import CompiledFirmware
 from tests.hil_sim.test_faults_matrix import ROWS, is_quick
 
 ROOT = Path(__file__).parents[2]
@@ -34,17 +34,13 @@ def rests_on(row, name, message):
 
 @pytest.mark.parametrize(("name", "policy", "message"), IGNORED, ids=lambda value: value)
 def test_exactly_the_rows_of_an_ignored_fault_are_red(name, policy, message, tmp_path):
-    tree = tmp_path / "tree"
-    shutil.copytree(ROOT / "firmware_c", tree / "firmware_c")
-    source = tree / "firmware_c" / "src" / "monitor.c"
-    text = source.read_text()
-    assert policy in text, "the mutant no longer applies; bring it up to date"
-    source.write_text(text.replace(policy, policy[: policy.index("{")] + NEVER))
+    ignored = policy[: policy.index("{")] + NEVER
+    build = CompiledFirmware.build(tmp_path / "base").variant(
+        "monitor.c", policy, ignored, tmp_path / "out"
+    )
     python = [sys.executable, "-m"]
-    build = [*python, "bms.native_build", "--tree", str(tree), "--out", str(tmp_path / "out")]
-    subprocess.run(build, check=True, cwd=ROOT, capture_output=True)
     run = [*python, "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", MATRIX]
-    run += ["--firmware-build", str(tmp_path / "out"), "-k", "test_quick_row"]
+    run += ["--firmware-build", str(build), "-k", "test_quick_row"]
     run += [f"--junitxml={tmp_path / 'junit.xml'}"]
     result = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=False)
     assert result.returncode == 1, result.stdout[-2000:]
