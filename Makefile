@@ -17,7 +17,7 @@ PYTEST := $(BIN)/python -m pytest -n 2
 # What `make quick` tries: the C core, and of Python what is nearest to it.
 QUICK_TESTS ?= tests/firmware tests/codegen tests/bms
 
-.PHONY: help build run quick test lint generate models verify-tables fuzz benchmark clean
+.PHONY: help build run quick test lint generate models verify-tables long-checks fuzz benchmark clean
 .DEFAULT_GOAL := help
 
 help: ## List the targets
@@ -63,6 +63,9 @@ models: build/extensions ## Train the shipped models anew (both presets, lagged 
 
 verify-tables: build/extensions ## Try all 2^32 arguments of every edge of the shipped models in C (some 10 minutes)
 	$(BIN)/bms verify-tables --stride 1
+
+long-checks: .venv/tests build/extensions ## What takes too long for make test (see results/checks.toml) where its inputs have changed; CHECKS=name alone
+	$(BIN)/python tools/long_checks.py $(CHECKS)
 
 fuzz: .venv/tests build/extensions ## 10^7 random and damaged frames through the ECU with sanitizers; SEED=n for others
 	$(BIN)/python -m tests.firmware.native.build fuzz --sanitize --out build/native
