@@ -9,11 +9,13 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
+from _pytest.terminal import TerminalReporter
 from hypothesis import settings
 
 from bms.native_build import FIRMWARE
 from bms.studies.rivals.native_build import RIVALS
 from hil_sim.studies.campaign.native_build import RUNNER
+from tools.long_checks import load_checks
 
 # The machine may be busy with other tests; time is measured in benchmarks only.
 settings.register_profile("no_deadline", deadline=None)
@@ -29,6 +31,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         type=Path,
         help="folder of a variant made by 'python -m bms.native_build', used instead",
     )
+    parser.addoption("--long", metavar="GROUP", help="the long tests of this group and no others")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -53,6 +56,27 @@ def _use_variant(folder: Path) -> None:
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
     sys.modules[EXTENSION] = module
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Long tests run when they are asked for; results/ has what they said last."""
+    wanted = config.getoption("--long")
+    config.hook.pytest_deselected(items=[item for item in items if _group(item) != wanted])
+    items[:] = [item for item in items if _group(item) == wanted]
+
+
+def _group(item: pytest.Item) -> str | None:
+    marker = item.get_closest_marker("long")
+    return None if marker is None else str(marker.args[0])
+
+
+def pytest_terminal_summary(terminalreporter: TerminalReporter, config: pytest.Config) -> None:
+    """Say what kept results hold instead; tests/test_long_checks.py holds those to date."""
+    groups = [check.name for check in load_checks() if check.name.startswith("long-")]
+    if config.getoption("--long") is None:
+        terminalreporter.line(
+            f"long tests are left to {', '.join(groups)} in results/; 'make long-checks' runs them"
+        )
 
 
 @pytest.fixture

@@ -126,7 +126,7 @@ def fault_numbers() -> dict[str, int]:
 
 def matrix_path() -> Path:
     """The matrix that comes with the package."""
-    return Path(str(files("hil_sim") / "faults" / "matrix.toml"))
+    return Path(str(files("hil_sim") / "fault_matrix" / "matrix.toml"))
 
 
 def load_matrix(path: Path | None = None) -> tuple[Row, ...]:

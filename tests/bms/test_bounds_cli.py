@@ -125,6 +125,7 @@ def test_wrong_use_is_one_line(bms, trained, arguments, told):
     assert err.count("\n") == 1
 
 
+@pytest.mark.long("training")
 def test_shipped_default_is_found_as_it_states(bms, tmp_path):
     code, out, _ = bms("bound", "--model", shipped_model_path("paper_calibrated"), "--json")
 

@@ -78,6 +78,7 @@ def smooth_data(noise_K, count=6000):
     return Samples(inputs, core_K, np.zeros(count, dtype=np.int64), np.arange(count) * 1.0)
 
 
+@pytest.mark.long("training")
 def test_sweep_finds_the_order_of_cubic_splines_and_the_floor_of_noisy_data():
     data = smooth_data(0.05)
     settings = TrainingSettings(epochs=5, refinement_steps=40)

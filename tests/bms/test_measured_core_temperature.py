@@ -20,13 +20,18 @@ def settings(lags_s):
     return TrainingSettings(width=(4 + 2 * len(lags_s), 1, 1), lag_time_constants_s=lags_s)
 
 
-@pytest.mark.parametrize(("lags_s", "rmse_K"), [((), 0.13), (LAGS_S, 0.055)])
+LAGGED = pytest.param(LAGS_S, 0.055, marks=pytest.mark.long("training"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("lags_s", "rmse_K"), [((), 0.13), LAGGED])
 def test_last_third_of_the_cycle_is_estimated_from_the_first_two(lags_s, rmse_K):
     model = model_for_measurements(RECORDING, settings(lags_s), lambda share: None)
     assert model.errors["test"].overall.rmse_K <= rmse_K
     assert model.errors["training"].overall.rmse_K <= rmse_K
 
 
+@pytest.mark.long("training")
 @pytest.mark.parametrize(("lags_s", "rmse_K"), [((), 0.13), (LAGS_S, 0.055)])
 def test_first_third_is_estimated_from_the_last_two(tmp_path, lags_s, rmse_K):
     """Holds no choice made on the last third: here it trains, and the first third is unseen."""

@@ -99,6 +99,7 @@ def test_recording_is_judged_by_its_last_third(bms, recording):
     assert by_name(result, "tuned")["errors"]["last third"]["rmse_K"] < 0.01
 
 
+@pytest.mark.long("training")
 @pytest.mark.skipif(not MEASURED.is_file(), reason=f"not run: {MEASURED} is absent")
 def test_on_measured_temperatures_a_linear_map_beats_the_filters(bms):
     out = bms(

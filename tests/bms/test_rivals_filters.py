@@ -152,6 +152,7 @@ def test_extended_filter_learns_a_resistance_that_the_linear_one_has_wrong():
     assert np.abs(learning_K[late]).max() < 0.1 * np.abs(stubborn_K[late]).max()
 
 
+@pytest.mark.long("training")
 def test_tuning_finds_a_cell_that_explains_the_fitted_rows_and_those_after_them():
     data = Sequences.of(charge(rows=900))
     fitted = FittedRows(data, np.arange(900) < 600, PERIOD_S)

@@ -24,6 +24,7 @@ def recording(tmp_path_factory):
     return write_recording(tmp_path_factory.mktemp("data") / "run.csv", rows=600)
 
 
+@pytest.mark.long("training")
 def test_retraining_the_default_reproduces_the_shipped_errors(bms, tmp_path):
     code, out, _ = bms("train", "--preset", DEFAULT_PRESET, "--out", tmp_path / "model.json")
 

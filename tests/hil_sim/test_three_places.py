@@ -36,6 +36,7 @@ from tests.hil_sim.golden.record import FOLDER, SCENARIOS
 from tests.hil_sim.lines import Line
 from tests.hil_sim.test_faults_matrix import ROWS
 from tests.hil_sim.test_vcan import HAS_GUEST, HAS_VCAN, MISSING
+from tools.long_checks import load_checks
 
 HAS_BOARDS = not needs_emulator.args[0]
 HAS_LINUX = HAS_VCAN or HAS_GUEST or "CI" in os.environ
@@ -56,9 +57,9 @@ FAULTS = (
     "current sensor disagrees with the command: offset 3.0",
     "charger ignores commands",
 )
-# All rows take a quarter of an hour: a choice of them by default, all in CI.
-IS_WHOLE = "CI" in os.environ
-PLAYED = [row for row in ROWS if not why_not_played(row) and (IS_WHOLE or row.name in FAULTS)]
+# All rows take a quarter of an hour: results/three-places.json has them, here is a choice.
+PLAYED = [row for row in ROWS if row.name in FAULTS]
+WHOLE = next(check for check in load_checks() if check.name == "three-places")
 HOT = FOLDER / "hot_derating.log.gz"
 
 
@@ -91,6 +92,7 @@ def places(charge_and_faults, golden):
     """
     charge, *faults = charge_and_faults
     assert charge.name == FULL_CHARGE
+    assert len(faults) == len(FAULTS)
     own = [scenario for name, scenario in golden.items() if name not in OTHER_CALIBRATION]
     other = [golden[name] for name in OTHER_CALIBRATION]
     work = []
@@ -98,8 +100,7 @@ def places(charge_and_faults, golden):
         work.append((linux(), [*charge_and_faults, *own]))
     if HAS_BOARDS:
         work.append((board(HARD_FLOAT), [*faults, *golden.values()]))
-        some = faults if IS_WHOLE else [golden["sensor_fault"]]
-        work.append((board(SOFT_FLOAT), [charge, *some, *other]))
+        work.append((board(SOFT_FLOAT), [golden["sensor_fault"], *other]))
     # One after the other: there are as many workers of the tests as cores.
     return {target.name: compare_targets([target], played)[0] for target, played in work}
 
@@ -137,8 +138,20 @@ def test_a_microcontroller_with_floating_point_says_the_same(places):
 @needs_emulator
 def test_a_microcontroller_without_floating_point_says_the_same(places):
     assert differing(places["qemu:mps2-an385"]) == {}
-    faults = len(PLAYED) if IS_WHOLE else 1
-    assert len(places["qemu:mps2-an385"]) == 1 + faults + len(OTHER_CALIBRATION)
+    assert len(places["qemu:mps2-an385"]) == 1 + len(OTHER_CALIBRATION)
+
+
+def test_in_the_kept_result_all_places_say_the_same_in_every_row():
+    """That it was made with the sources here is held by tests/test_long_checks.py."""
+    said = WHOLE.result()["said"]
+    played = [row.name for row in ROWS if not why_not_played(row)]
+    assert said["equal"] is True
+    assert [scenario["name"] for scenario in said["scenarios"]] == [FULL_CHARGE, *played]
+    assert len(played) > 200
+    for scenario in said["scenarios"]:
+        assert {place: one["equal"] for place, one in scenario["targets"].items()} == dict.fromkeys(
+            NAMES, True
+        )
 
 
 @needs_emulator
@@ -299,13 +312,6 @@ def test_equal_answers_are_no_difference(golden_start):
 @pytest.fixture(scope="module")
 def golden_start():
     return load_scenarios([FOLDER / "charge_start.log.gz"])
-
-
-@pytest.mark.skipif(
-    not IS_WHOLE, reason="plays some rows of the fault matrix; with CI=1 or 'make three-places' all"
-)
-def test_every_row_that_a_recording_can_hold_was_played():
-    assert len(PLAYED) == sum(why_not_played(row) is None for row in ROWS) > 200
 
 
 def test_only_rows_that_no_recording_can_hold_are_left_out():

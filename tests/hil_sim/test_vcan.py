@@ -30,7 +30,8 @@ bus=(--bus socketcan:vcan0)
 "${bms[@]}" plant "${bus[@]}" --answer-timeout-s 0.1 2> alone.err; echo $? > alone.status
 
 ( "${bms[@]}" ecu "${bus[@]}" --silence-s 2 > ecu.out; echo $? > ecu.status ) &
-"${bms[@]}" plant "${bus[@]}" --seed SEED --out run --json > plant.json; echo $? > plant.status
+"${bms[@]}" plant "${bus[@]}" --seed SEED --max-time-s MAX_TIME --out run --json > plant.json
+echo $? > plant.status
 wait
 
 "${bms[@]}" ecu "${bus[@]}" --realtime > realtime.out &
@@ -49,10 +50,22 @@ def run_in_guest(*command, folder):
     )  # fmt: skip
 
 
+# A whole charge takes minutes in the guest; derating has begun by the end of the shorter one.
+WHOLE_S, SHORT_S = 3600.0, 200.0
+
+
+@pytest.fixture(
+    scope="module", params=[SHORT_S, pytest.param(WHOLE_S, marks=pytest.mark.long("vcan"))]
+)
+def max_time_s(request):
+    return request.param
+
+
 @pytest.fixture(scope="module")
-def guest(tmp_path_factory):
+def guest(tmp_path_factory, max_time_s):
     folder = tmp_path_factory.mktemp("vcan")
-    done = run_in_guest("bash", "-c", SCRIPT.replace("SEED", str(SEED)), folder=folder)
+    script = SCRIPT.replace("SEED", str(SEED)).replace("MAX_TIME", str(max_time_s))
+    done = run_in_guest("bash", "-c", script, folder=folder)
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -61,9 +74,10 @@ def status(path):
     return int(path.read_text())
 
 
-def test_two_processes_give_the_frames_of_the_virtual_bus(guest, preset, tmp_path):
+def test_two_processes_give_the_frames_of_the_virtual_bus(guest, max_time_s, preset, tmp_path):
     with Recorder(tmp_path / "can.log") as recorder:
-        expected = run_both(Settings(preset, seed=SEED), recorder).summary
+        settings = Settings(preset, seed=SEED, max_time_s=max_time_s)
+        expected = run_both(settings, recorder).summary
     assert (guest / "run" / "can.log").read_bytes() == (tmp_path / "can.log").read_bytes()
     summary = json.loads((guest / "plant.json").read_text())
     for key, value in expected.to_json().items():
@@ -71,7 +85,8 @@ def test_two_processes_give_the_frames_of_the_virtual_bus(guest, preset, tmp_pat
             assert summary[key] == value
     assert summary["bus"] == "socketcan:vcan0"
     assert summary["limits_kept"] is True
-    assert summary["stop_reason"] == "complete"
+    assert summary["stop_reason"] == ("complete" if max_time_s == WHOLE_S else "time-limit")
+    assert summary["first_derate_s"] is not None
 
 
 def test_both_processes_end_well_and_the_ecu_saw_every_frame(guest):
