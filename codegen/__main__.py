@@ -1,4 +1,7 @@
-"""`python -m codegen`: regenerate firmware_c/generated and docs/can.md, which are checked in."""
+"""`python -m codegen`: write what is generated and checked in anew.
+
+That is firmware_c/generated, hil_sim/bus/catalog.py and docs/can.md.
+"""
 
 from pathlib import Path
 
@@ -6,6 +9,7 @@ from bms.model.model_file import load_shipped_model
 from bms.presets import DEFAULT_PRESET, load_preset
 from codegen.calibration_source import calibration_source
 from codegen.can_document import can_document
+from codegen.can_names import can_names
 from codegen.can_sources import can_sources
 from codegen.rendering import write_files
 
@@ -15,4 +19,5 @@ FIRMWARE = ROOT / "firmware_c"
 if __name__ == "__main__":
     sources = calibration_source(load_preset(DEFAULT_PRESET), load_shipped_model(DEFAULT_PRESET))
     write_files(FIRMWARE / "generated", {**can_sources(), **sources})
+    write_files(ROOT / "hil_sim" / "bus", can_names())
     write_files(ROOT / "docs", {"can.md": can_document(FIRMWARE)})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from importlib.resources import files
 
 import cantools
@@ -16,6 +17,11 @@ ECU, PLANT = "ECU", "PLANT"
 def database_text() -> str:
     """Text of bms.dbc."""
     return (files("codegen") / "can" / "bms.dbc").read_text(encoding="utf-8")
+
+
+def database_digest() -> str:
+    """SHA-256 of bms.dbc, as hexadecimal text."""
+    return hashlib.sha256(database_text().encode()).hexdigest()
 
 
 def load_database() -> Database:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from typing import Any
 
@@ -14,7 +13,7 @@ from codegen.can_database import (
     ECU,
     PLANT,
     data_ids,
-    database_text,
+    database_digest,
     load_database,
     number_attribute,
 )
@@ -56,7 +55,7 @@ def _catalogue(database: Database) -> dict[str, Any]:
 
     signals = [s for m in database.messages for s in m.signals if s.unit]
     return {
-        "digest": hashlib.sha256(database_text().encode()).hexdigest(),
+        "digest": database_digest(),
         "received": messages(PLANT),
         "transmitted": messages(ECU),
         "signals": [_signal(s) for s in signals],

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 from annotated_types import Ge, Le, Len
-from bms.firmware._firmware import ffi
 
 from bms.errors import InputError
 from bms.validation import Positive, parse, read_toml, strict
+from hil_sim.bus.catalog import FirstFault, ReceivedName
 from hil_sim.bus.database import MessageCodec, load_database
 from hil_sim.faults.base import Fault
 from hil_sim.faults.frames import MessageName
@@ -22,7 +22,7 @@ from hil_sim.faults.sensors import SensorName
 
 EACH = "each"
 _EACH_OF = {
-    "message": ("CellElectrical", "CellThermal", "Coolant", "ChargeRequest"),
+    "message": get_args(ReceivedName),
     "sensor": get_args(SensorName),
 }
 
@@ -117,11 +117,8 @@ class Row:
 
 def fault_numbers() -> dict[str, int]:
     """Numbers of the firmware's faults by name, such as surface-deficit."""
-    prefix = "FAULT_"
-    names: dict[str, int] = ffi.typeof("fault_t").relements
-    return {
-        name.removeprefix(prefix).lower().replace("_", "-"): int(n) for name, n in names.items()
-    }
+    faults = (fault for fault in FirstFault if fault is not FirstFault.NONE)
+    return {fault.label.replace("_", "-"): fault.value for fault in faults}
 
 
 def matrix_path() -> Path:

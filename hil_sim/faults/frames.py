@@ -16,25 +16,14 @@ from annotated_types import Ge, Le
 from bms.errors import InputError
 from bms.validation import strict
 from hil_sim.bus.buses import Frame
+from hil_sim.bus.catalog import Message, ReceivedName, SentName
 from hil_sim.bus.database import COUNTER_MODULUS, MessageCodec, profile2_crc
 from hil_sim.faults.base import Fault
 
 MAX_DATA_LENGTH = 8
 HIGHEST_ID = 0x7FF
 
-MessageName = Literal[
-    "CellElectrical",
-    "CellThermal",
-    "Coolant",
-    "ChargeRequest",
-    "ChargeCommand",
-    "Estimate",
-    "Decision",
-    "DecisionMargins",
-    "Diagnostics",
-    "Identity",
-    "NetworkDiagnostics",
-]
+MessageName = Literal[ReceivedName, SentName]
 
 
 @dataclass
@@ -204,7 +193,7 @@ class WrongId(MessageFault):
 
     def check(self, database: Mapping[str, MessageCodec]) -> None:
         """The identifier must be another one, and not SYNC, which is the clock."""
-        if self.frame_id in (database[self.message].frame_id, database["SYNC"].frame_id):
+        if self.frame_id in (database[self.message].frame_id, database[Message.SYNC].frame_id):
             raise InputError(
                 f"frame_id: {self.frame_id:#x} is the identifier of {self.message} or SYNC; "
                 "give another one"
@@ -268,7 +257,7 @@ class BusOff(FrameFault):
 
     def apply(self, frames: list[Frame], active: bool, memory: FrameMemory) -> list[Frame]:
         """SYNC alone."""
-        sync_id = memory.database["SYNC"].frame_id
+        sync_id = memory.database[Message.SYNC].frame_id
         return [frame for frame in frames if not active or frame.frame_id == sync_id]
 
 

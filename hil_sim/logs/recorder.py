@@ -6,8 +6,8 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from hil_sim.bus.buses import Frame
+from hil_sim.bus.catalog import FrameId
 from hil_sim.bus.closing import Closing
-from hil_sim.bus.identifiers import SYNC_ID
 from hil_sim.logs import LogFrame, LogWriter
 
 
@@ -44,7 +44,7 @@ class PeriodRecorder(Recorder):
 
     def record(self, time_s: float, frame: Frame, received: bool) -> None:
         """Keep one frame; SYNC ends the period."""
-        if not received and frame.frame_id == SYNC_ID:
+        if not received and frame.frame_id == FrameId.SYNC:
             self.periods.append(self._sent)
             self._sent = []
         elif not received:

@@ -6,27 +6,31 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from hil_sim.bus.catalog import ActiveConstraint, CommandState, ReportedState
 from hil_sim.monitor import wording
 from hil_sim.monitor.model import MOST_COUNTED, ReceiverReport, Snapshot
 from hil_sim.monitor.presets import PresetInForce
 from hil_sim.monitor.traffic import MessageTraffic
 
-_STATE_STYLES = {
-    "Charging": "black on green",
-    "Derated": "black on yellow",
-    "Complete": "black on cyan",
-    "Fault": "white on red",
+_STATE_STYLES: dict[float | None, str] = {
+    CommandState.CHARGING: "black on green",
+    CommandState.DERATED: "black on yellow",
+    CommandState.COMPLETE: "black on cyan",
+    CommandState.FAULT: "white on red",
 }
-_RECEIVER_STYLES = {"Valid": "green", "Invalid": "red"}
+_OTHER_STATE_STYLE = "black on white"
+_RECEIVER_STYLES = {ReportedState.VALID.label: "green", ReportedState.INVALID.label: "red"}
+_NOT_LIMITING = (ActiveConstraint.NONE.label, ActiveConstraint.INVALID.label, wording.NOT_AVAILABLE)
 _WRONG = "bold red"
 
 
 def header(snapshot: Snapshot, bus: str) -> Table:
     """State, bus, what sets the pace, and how to leave."""
     reading = snapshot.readings["DiagnosticState"]
-    name = wording.state(snapshot)
-    style = "black on white" if reading.is_stale else _STATE_STYLES.get(name, "black on white")
-    left = Text(f" {name} ", f"bold {style}")
+    style = _OTHER_STATE_STYLE
+    if not reading.is_stale:
+        style = _STATE_STYLES.get(reading.value, _OTHER_STATE_STYLE)
+    left = Text(f" {wording.state(snapshot)} ", f"bold {style}")
     if reading.is_stale:
         left.append(" stale ", _WRONG)
     table = Table.grid(padding=(0, 2, 0, 0), expand=True)
@@ -69,7 +73,7 @@ def decision(snapshot: Snapshot) -> Table:
     table.add_column(no_wrap=True)
     table.add_column(no_wrap=True)
     constraint = wording.constraint(snapshot)
-    is_limiting = constraint not in ("none", "invalid", wording.NOT_AVAILABLE)
+    is_limiting = constraint not in _NOT_LIMITING
     command = Text.assemble(
         (wording.quantity(readings["CommandCurrent"], 3, "A"), "bold"),
         f"   admitted {wording.interval(snapshot)}   constraint ",
@@ -149,7 +153,7 @@ def _receiver_state(report: ReceiverReport) -> Text:
         return Text("stale", "red")
     if report.state is None:
         return Text(wording.NOT_AVAILABLE, "dim")
-    return Text(report.state, _RECEIVER_STYLES.get(report.state, "yellow"))
+    return Text(report.state, _RECEIVER_STYLES.get(report.state.lower(), "yellow"))
 
 
 def _counts(report: ReceiverReport) -> list[Text]:

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 from codegen import can_database
 from hil_sim.bus.buses import Frame
+from hil_sim.bus.catalog import Message
 from hil_sim.bus.database import MessageCodec, Values
 from hil_sim.bus.identity import Identity
 from hil_sim.monitor.listener import ForeignFrame
 from hil_sim.monitor.traffic import ForeignMeter, ForeignTraffic, MessageMeter, MessageTraffic
 
-SYNC = "SYNC"
-NETWORK_DIAGNOSTICS = "NetworkDiagnostics"
 COUNTS = ("WrongCrcFrames", "WrongLengthFrames", "RepeatedFrames", "LostFrames", "ReorderedFrames")
 MOST_COUNTED = 255
 """A count that stands for itself or more."""
@@ -73,7 +72,7 @@ class Snapshot:
     @property
     def is_lock_step(self) -> bool:
         """Whether a SYNC starts each period."""
-        sync = self.message(SYNC)
+        sync = self.message(Message.SYNC)
         return sync.age_s is not None and not sync.is_stale
 
 
@@ -106,7 +105,7 @@ class SystemModel:
             self._foreign.take(time_s, frame)
             return
         values = meter.take(time_s, frame.data)
-        if values is not None and meter.codec.name == NETWORK_DIAGNOSTICS:
+        if values is not None and meter.codec.name == Message.NETWORK_DIAGNOSTICS:
             self._reports[_whole(values["ReportedMessage"])] = time_s, values
 
     def snapshot(self, now_s: float) -> Snapshot:
@@ -135,7 +134,7 @@ class SystemModel:
 
     def _receiver(self, number: int, name: str, now_s: float) -> ReceiverReport:
         time_s, values = self._reports.get(number, (now_s, {}))
-        stale_s = self._meters[self._ids[NETWORK_DIAGNOSTICS]].stale_s
+        stale_s = self._meters[self._ids[Message.NETWORK_DIAGNOSTICS]].stale_s
         state = values.get("ReportedState")
         return ReceiverReport(
             frame_id=self._ids[name],

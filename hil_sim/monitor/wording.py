@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hil_sim.bus.catalog import FirstFault
 from hil_sim.monitor.model import Reading, Snapshot
 
 NOT_AVAILABLE = "n/a"
@@ -40,8 +41,9 @@ def fault_names(names: list[str] | None) -> str:
 
 def first_fault(snapshot: Snapshot) -> str:
     """Name of the first latched fault."""
-    name = snapshot.name("FirstFault")
-    return NOT_AVAILABLE if name is None else "none" if name == "None" else name
+    if snapshot.readings["FirstFault"].value == FirstFault.NONE:
+        return FirstFault.NONE.label
+    return snapshot.name("FirstFault") or NOT_AVAILABLE
 
 
 def state(snapshot: Snapshot) -> str:

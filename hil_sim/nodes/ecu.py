@@ -9,10 +9,12 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from hil_sim.bus.buses import CanBus, Frame
-from hil_sim.bus.identifiers import MEASUREMENT_ID, SYNC_ID
+from hil_sim.bus.catalog import FrameId
 from hil_sim.nodes.clock import Clock
 from hil_sim.nodes.punctuality import DEADLINE_PERIODS, Slots
 
+MEASUREMENT_ID = FrameId.CELL_ELECTRICAL
+"""What the plant begins a period with."""
 PHASE_PERIODS = 20
 """Measurements after which an ECU on its own clock corrects its phase."""
 
@@ -104,7 +106,7 @@ class EcuNode:
     def _take(self, frame: Frame) -> bool:
         self.frames += 1
         self._ecu.receive(frame.frame_id, frame.data)
-        return frame.frame_id == SYNC_ID
+        return frame.frame_id == FrameId.SYNC
 
     def _step(self) -> None:
         self._ecu.step()

@@ -7,27 +7,32 @@ from dataclasses import dataclass
 
 from bms.errors import BusError
 from bms.firmware import Reception, ReceptionCounts
+from hil_sim.bus import catalog
 from hil_sim.bus.buses import CanBus, Frame, ecu_remedy, is_line
+from hil_sim.bus.catalog import Message
 from hil_sim.bus.database import COUNTER_MODULUS, MessageCodec, Values
 from hil_sim.bus.e2e import Receiver, Sender
 from hil_sim.logs.recorder import Recorder
 from hil_sim.nodes.turns import Turn
 from hil_sim.plant.sensors import Readings
 
-REQUEST_OFF, REQUEST_CHARGE = 0, 1
-NO_FAULT = 255
 CONNECT_ATTEMPTS = 10
 
 _REPORTS = (
-    "Estimate",
-    "Decision",
-    "DecisionMargins",
-    "Diagnostics",
-    "NetworkDiagnostics",
-    "Identity",
+    Message.ESTIMATE,
+    Message.DECISION,
+    Message.DECISION_MARGINS,
+    Message.DIAGNOSTICS,
+    Message.NETWORK_DIAGNOSTICS,
+    Message.IDENTITY,
 )
+_STATES = {state.value: state.label for state in catalog.CommandState}
+_CONSTRAINTS = {constraint.value: constraint.label for constraint in catalog.ActiveConstraint}
 
-Line = Callable[[list[Frame]], list[Frame]]
+Delivery = Callable[[list[Frame]], list[Frame]]
+"""Frames that arrive in place of those that were sent."""
+StampedFrame = tuple[float, Frame]
+"""A frame with its time in s."""
 
 
 @dataclass(frozen=True)
@@ -42,17 +47,9 @@ class Request:
 class Answer:
     """What the ECU said in one period: values by signal name, None where it said nothing."""
 
-    def __init__(
-        self,
-        values: Values,
-        is_command_usable: bool,
-        states: dict[int, str],
-        constraints: dict[int, str],
-    ) -> None:
+    def __init__(self, values: Values, is_command_usable: bool) -> None:
         self._values = values
         self._is_command_usable = is_command_usable
-        self._states = states
-        self._constraints = constraints
 
     def value(self, signal: str) -> float | None:
         """Value of a signal in the database's unit."""
@@ -71,12 +68,12 @@ class Answer:
     @property
     def state(self) -> str | None:
         """Name of the ECU's state, in small letters."""
-        return _choice(self._states, self.value("CommandState"))
+        return _label(_STATES, self.value("CommandState"))
 
     @property
     def active_constraint(self) -> str | None:
         """Name of the constraint that decided, in small letters."""
-        return _choice(self._constraints, self.value("ActiveConstraint"))
+        return _label(_CONSTRAINTS, self.value("ActiveConstraint"))
 
     @property
     def feasible(self) -> bool | None:
@@ -94,10 +91,10 @@ class PlantNode:
         database: dict[str, MessageCodec],
         turn: Turn,
         recorder: Recorder | None = None,
-        sent: Line = list,
-        heard: Line = list,
+        sent: Delivery = list,
+        heard: Delivery = list,
     ) -> None:
-        """`sent` and `heard` are where frames get lost or change on their way to and from the ECU.
+        """`sent` and `heard` say what arrives of the frames on their way to and from the ECU.
 
         What is recorded is what the ECU gets and what it says.
         """
@@ -105,18 +102,16 @@ class PlantNode:
         self._sent, self._heard = sent, heard
         self._turn = turn
         self._recorder = recorder
-        self._electrical = Sender(database["CellElectrical"])
-        self._thermal = Sender(database["CellThermal"])
-        self._coolant = Sender(database["Coolant"])
-        self._request = Sender(database["ChargeRequest"])
-        self._sync = Frame(database["SYNC"].frame_id, b"")
+        self._electrical = Sender(database[Message.CELL_ELECTRICAL])
+        self._thermal = Sender(database[Message.CELL_THERMAL])
+        self._coolant = Sender(database[Message.COOLANT])
+        self._request = Sender(database[Message.CHARGE_REQUEST])
+        self._sync = Frame(database[Message.SYNC].frame_id, b"")
         self._receivers = {database[name].frame_id: Receiver(database[name]) for name in _REPORTS}
-        self._command = database["ChargeCommand"]
+        self._command = database[Message.CHARGE_COMMAND]
         self._reception = Reception(self._command.frame_id)
-        self._states = database["ChargeCommand"].choices["CommandState"]
-        self._constraints = database["Decision"].choices["ActiveConstraint"]
         self._last_counter: int | None = None
-        self._connected = False
+        self._is_connected = False
         self._is_answer_late = False
 
     @property
@@ -139,24 +134,8 @@ class PlantNode:
         frames = self._sent(self._frames(readings, request))
         late = self._late_frames(period) if self._is_answer_late else []
         self._turn.begin()
-        heard: list[tuple[float, Frame]] = []
-        for attempt in range(CONNECT_ATTEMPTS):
-            if attempt == 0 or not is_line(self._bus.name):
-                heard.clear()
-                sent_s = self._turn.time_s(period)
-                for frame in frames:
-                    self._bus.send(frame)
-            heard += [
-                (self._turn.time_s(period), frame)
-                for frame in self._turn.answers(self._bus, period, self._is_last)
-            ]
-            is_answered = any(self._is_last(frame) for _, frame in heard)
-            self._connected = self._connected or is_answered
-            if self._connected or not self._turn.sync:
-                break
-        else:
-            raise BusError(f"bus '{self._bus.name}': no ECU answers; {ecu_remedy(self._bus.name)}")
-        self._is_answer_late = not is_answered
+        sent_s, heard = self._converse(period, frames)
+        self._is_answer_late = not self._is_answered(heard)
         self._follow([frame for _, frame in (*late, *heard)])
         if self._recorder is not None:
             for time_s, frame in late:
@@ -166,6 +145,31 @@ class PlantNode:
             for time_s, frame in heard:
                 self._recorder.record(time_s, frame, received=True)
         return self._answer(self._heard([frame for _, frame in heard]))
+
+    def _converse(self, period: int, frames: list[Frame]) -> tuple[float, list[StampedFrame]]:
+        """When the frames were published last, in s, and what was heard since."""
+        sent_s, heard = 0.0, list[StampedFrame]()
+        for attempt in range(CONNECT_ATTEMPTS):
+            if attempt == 0 or not is_line(self._bus.name):
+                sent_s, heard = self._publish(period, frames), []
+            heard += self._listen(period)
+            self._is_connected = self._is_connected or self._is_answered(heard)
+            if self._is_connected or not self._turn.sync:
+                return sent_s, heard
+        raise BusError(f"bus '{self._bus.name}': no ECU answers; {ecu_remedy(self._bus.name)}")
+
+    def _publish(self, period: int, frames: list[Frame]) -> float:
+        sent_s = self._turn.time_s(period)
+        for frame in frames:
+            self._bus.send(frame)
+        return sent_s
+
+    def _listen(self, period: int) -> list[StampedFrame]:
+        answers = self._turn.answers(self._bus, period, self._is_last)
+        return [(self._turn.time_s(period), frame) for frame in answers]
+
+    def _is_answered(self, heard: list[StampedFrame]) -> bool:
+        return any(self._is_last(frame) for _, frame in heard)
 
     def _is_last(self, frame: Frame) -> bool:
         """Whether it is the charge command that continues from the last one.
@@ -189,7 +193,7 @@ class PlantNode:
             return None
         return self._command.counter(frame.data)
 
-    def _late_frames(self, period: int) -> list[tuple[float, Frame]]:
+    def _late_frames(self, period: int) -> list[StampedFrame]:
         """What came too late for the last period; it must not pass for an answer to this one."""
         late = []
         while (frame := self._bus.receive(0.0)) is not None:
@@ -208,7 +212,7 @@ class PlantNode:
             self._coolant.frame({"CoolingPower": readings.cooling_power_W}),
             self._request.frame(
                 {
-                    "Request": REQUEST_CHARGE if request.charge else REQUEST_OFF,
+                    "Request": catalog.Request.CHARGE if request.charge else catalog.Request.OFF,
                     "ReferenceCurrent": request.reference_current_A,
                     "PlugInStateOfCharge": request.plug_in_soc,
                 }
@@ -224,9 +228,8 @@ class PlantNode:
                 values.update(receiver.accept(frame.data) or {})
             elif frame.frame_id == self._command.frame_id and self._reception.check(frame.data):
                 values.update(self._command.decode(frame.data) or {})
-        is_usable = self._reception.end_period()
-        return Answer(values, is_usable, self._states, self._constraints)
+        return Answer(values, self._reception.end_period())
 
 
-def _choice(names: dict[int, str], value: float | None) -> str | None:
-    return None if value is None else names.get(int(value), "unknown").lower()
+def _label(labels: dict[int, str], value: float | None) -> str | None:
+    return None if value is None else labels.get(int(value), "unknown")

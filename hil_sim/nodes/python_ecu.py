@@ -8,13 +8,18 @@ from collections.abc import Callable, Sequence
 from bms.decision import ACTIVE_CONSTRAINTS, Controller, Decision, Observation
 from bms.presets import Preset
 from hil_sim.bus.buses import Frame
+from hil_sim.bus.catalog import CommandState, FirstFault, Message, Request
 from hil_sim.bus.database import MessageCodec, Values
 from hil_sim.bus.e2e import Receiver, Sender
-from hil_sim.nodes.plant import NO_FAULT, REQUEST_CHARGE
 from hil_sim.nodes.views import View
 
-STANDBY, CHARGING, DERATED, COMPLETE = 1, 2, 3, 4
-_SENT = ("Estimate", "Decision", "DecisionMargins", "Diagnostics", "ChargeCommand")
+_SENT = (
+    Message.ESTIMATE,
+    Message.DECISION,
+    Message.DECISION_MARGINS,
+    Message.DIAGNOSTICS,
+    Message.CHARGE_COMMAND,
+)
 
 
 class PythonEcu:
@@ -34,8 +39,8 @@ class PythonEcu:
         self._controller: Controller | None = None
         self._limits = preset.limits
         self._view = view
-        self._request_id = database["ChargeRequest"].frame_id
-        self._request = Receiver(database["ChargeRequest"])
+        self._request_id = database[Message.CHARGE_REQUEST].frame_id
+        self._request = Receiver(database[Message.CHARGE_REQUEST])
         self._plug_in_soc: float | None = None
         self._reference_A = 0.0
         self._complete = False
@@ -50,7 +55,7 @@ class PythonEcu:
         request = self._request.accept(data)
         if request is None:
             return
-        on = request["Request"] == REQUEST_CHARGE
+        on = request["Request"] == Request.CHARGE
         self._plug_in_soc = request["PlugInStateOfCharge"] if on else None
         self._reference_A = request["ReferenceCurrent"] or 0.0
 
@@ -75,19 +80,20 @@ class PythonEcu:
         queue, self._queue = self._queue, []
         return queue
 
-    def _state(self, decision: Decision | None) -> int:
+    def _state(self, decision: Decision | None) -> CommandState:
         if decision is None:
-            return COMPLETE if self._complete else STANDBY
-        return CHARGING if decision.current_A == self._reference_A else DERATED
+            return CommandState.COMPLETE if self._complete else CommandState.STANDBY
+        is_free = decision.current_A == self._reference_A
+        return CommandState.CHARGING if is_free else CommandState.DERATED
 
 
-def _values(observation: Observation, decision: Decision | None, state_number: int) -> Values:
+def _values(observation: Observation, decision: Decision | None, state: CommandState) -> Values:
     knows_core = not math.isnan(observation.core_temperature_K)
     values: Values = {
         "CommandCurrent": decision.current_A if decision else 0.0,
-        "CommandState": state_number,
-        "DiagnosticState": state_number,
-        "FirstFault": NO_FAULT,
+        "CommandState": state,
+        "DiagnosticState": state,
+        "FirstFault": FirstFault.NONE,
         "ActiveFaults": 0,
         "LatchedFaults": 0,
         "CoreTemperature": observation.core_temperature_K,

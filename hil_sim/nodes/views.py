@@ -7,6 +7,7 @@ from typing import Protocol
 
 from bms.decision import Observation
 from bms.presets import Preset
+from hil_sim.bus.catalog import Message
 from hil_sim.bus.database import MessageCodec
 from hil_sim.bus.e2e import Receiver
 from hil_sim.plant.plant import Plant
@@ -47,7 +48,7 @@ class TrueState:
 class BusMeasurements:
     """The measurements on the bus, and charge counted from them; the core stays unknown."""
 
-    _NEEDED = ("CellElectrical", "CellThermal", "Coolant")
+    _NEEDED = (Message.CELL_ELECTRICAL, Message.CELL_THERMAL, Message.COOLANT)
 
     def __init__(self, preset: Preset, database: dict[str, MessageCodec]) -> None:
         self._change_per_A = preset.timing.sampling_period_s / preset.cell.capacity_As

@@ -7,10 +7,9 @@ from pathlib import Path
 from bms.errors import InputError
 from bms.model.model_file import KanModel, load_model, shipped_model_path, shipped_models
 from bms.presets import Preset, load_preset, preset_names
+from hil_sim.bus.catalog import Message
 from hil_sim.bus.identity import Identity
 from hil_sim.replay.recording import Recording
-
-IDENTITY = "Identity"
 
 
 def choose_pair(
@@ -41,7 +40,7 @@ def identity_to_ignore(recording: Recording, preset: Preset, model: KanModel) ->
         and model.hash.startswith(recorded.model_hash)
         and preset.hash.startswith(recorded.preset_hash)
     )
-    return () if is_same else (recording.database[IDENTITY].frame_id,)
+    return () if is_same else (recording.database[Message.IDENTITY].frame_id,)
 
 
 def recorded_identity(recording: Recording) -> Identity:
@@ -56,7 +55,7 @@ def recorded_identity(recording: Recording) -> Identity:
 
 
 def _first_identity(recording: Recording) -> Identity | None:
-    codec = recording.database[IDENTITY]
+    codec = recording.database[Message.IDENTITY]
     for answer in recording.answers:
         for frame in answer:
             if frame.frame_id == codec.frame_id and (values := codec.decode(frame.data)):

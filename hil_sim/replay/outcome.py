@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from hil_sim.bus.catalog import Message
 from hil_sim.replay.recording import Answer, Recording
 from hil_sim.replay.signals import Signals
 
+_HEARD = (Message.CHARGE_COMMAND, Message.DIAGNOSTICS)
 _SECONDS_PER_HOUR = 3600.0
 
 
@@ -24,7 +26,7 @@ class Outcome:
 
 def outcome(recording: Recording, signals: Signals, answers: Sequence[Answer]) -> Outcome:
     """Sum up the answers to a recording; each command holds until the next period."""
-    wanted = {recording.database[name].frame_id for name in ("ChargeCommand", "Diagnostics")}
+    wanted = {recording.database[name].frame_id for name in _HEARD}
     currents_A, bits = [], 0
     for answer in answers:
         values = signals.decode(frame for frame in answer if frame.frame_id in wanted)

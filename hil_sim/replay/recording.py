@@ -13,11 +13,11 @@ from pathlib import Path
 from bms.errors import InputError
 from codegen import can_database
 from hil_sim.bus.buses import Frame
+from hil_sim.bus.catalog import FrameId, Message
 from hil_sim.bus.database import MessageCodec
-from hil_sim.bus.identifiers import SYNC_ID
 from hil_sim.logs import LogFrame, read_log
 
-LAST_MESSAGE = "ChargeCommand"
+LAST_MESSAGE = Message.CHARGE_COMMAND
 
 Answer = tuple[Frame, ...]
 
@@ -60,7 +60,7 @@ def load_recording(path: Path) -> Recording:
     frames = [frame for frame in read_log(path) if not frame.is_extended]
     _require_ours(path, frames, database)
     last_id = database[LAST_MESSAGE].frame_id
-    lock_step = any(frame.frame_id == SYNC_ID for frame in frames)
+    lock_step = any(frame.frame_id == FrameId.SYNC for frame in frames)
     cut = _Cutter(path, sent_by_ecu, last_id)
     periods = tuple(cut.lock_step(frames) if lock_step else cut.real_time(frames))
     _require_beginning(path, periods, database)
@@ -89,7 +89,7 @@ class _Cutter:
                 answer.append(frame)
                 continue
             received.append(frame)
-            if frame.frame_id == SYNC_ID:
+            if frame.frame_id == FrameId.SYNC:
                 if step is not None:
                     yield _period(*step, answer)
                 step, answer, received = (frame.time_s, tuple(received)), [], []

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 from bms.errors import BusError, ModelMismatchError
 from bms.presets import Preset
+from hil_sim.bus.catalog import CommandState, FirstFault
 from hil_sim.bus.identity import Identity
 from hil_sim.bus.refusal import refusal_text
 from hil_sim.faults import Injection
-from hil_sim.nodes.plant import NO_FAULT, Answer, PlantNode, Request
+from hil_sim.nodes.plant import Answer, PlantNode, Request
 from hil_sim.plant.charger import Charger
 from hil_sim.plant.plant import Plant
 from hil_sim.plant.sensors import Readings, SensorSuite
@@ -113,9 +114,11 @@ class Charge:
         if self._edge is not None or self.steps < OFF_PERIODS:
             return
         is_known = self.model_hash is None or self.identity is not None
-        if answer.state == "standby" and is_known:
+        if answer.state == CommandState.STANDBY.label and is_known:
             self._edge = self.steps
-        elif self.steps >= (STARTING_PERIODS if answer.state == "init" else READY_PERIODS):
+            return
+        is_starting = answer.state == CommandState.INIT.label
+        if self.steps >= (STARTING_PERIODS if is_starting else READY_PERIODS):
             raise BusError(
                 f"the ECU is not ready after {self.steps} periods (state: {answer.state or 'none'}"
                 f"{'' if is_known else ', model unknown'}); "
@@ -130,7 +133,7 @@ class Charge:
         if self._edge is not None and answer.value("ErrorBound") is not None:
             self.error_bound_K = answer.value("ErrorBound")
         fault = answer.value("FirstFault")
-        if fault is not None and fault != NO_FAULT:
+        if fault is not None and fault != FirstFault.NONE:
             self.first_fault = int(fault)
         identity = Identity.of(answer.value)
         if identity is not None:
@@ -160,9 +163,9 @@ class Charge:
             return None
         if self.ends_early and self._silent_periods >= SILENT_PERIODS:
             return STOP_SILENT
-        if self.ends_early and answer.state == "complete":
+        if self.ends_early and answer.state == CommandState.COMPLETE.label:
             return STOP_COMPLETE
-        if self.ends_early and answer.state == "fault":
+        if self.ends_early and answer.state == CommandState.FAULT.label:
             return STOP_FAULT
         if (self.steps - self._edge) * self._period_s >= self.max_time_s:
             return STOP_TIME_LIMIT

@@ -8,6 +8,7 @@ from typing import Any
 
 from bms.cell import CellState
 from bms.firmware import ReceptionCounts
+from hil_sim.bus.catalog import CommandState
 from hil_sim.faults.injection import InjectedFault
 from hil_sim.nodes.line_losses import LineLosses
 from hil_sim.nodes.plant import Answer
@@ -123,8 +124,8 @@ class Summary:
 STOP_COMPLETE, STOP_TIME_LIMIT = "complete", "time-limit"
 STOP_FAULT, STOP_SILENT = "fault", "ecu-silent"
 
-DERATED_STATE = "derated"
-CHARGING_STATES = ("charging", DERATED_STATE)
+DERATED_STATE = CommandState.DERATED.label
+CHARGING_STATES = (CommandState.CHARGING.label, DERATED_STATE)
 
 
 @dataclass(frozen=True)

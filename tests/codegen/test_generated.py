@@ -15,6 +15,7 @@ from bms.model.model_file import load_shipped_model
 from bms.presets import DEFAULT_PRESET, load_preset
 from codegen.calibration_source import calibration_source
 from codegen.can_document import can_document
+from codegen.can_names import can_names
 from codegen.can_sources import can_sources
 from codegen.rendering import float_literal, write_files
 
@@ -26,6 +27,10 @@ GENERATED = FIRMWARE / "generated"
 def regenerated() -> dict[str, str]:
     preset, model = load_preset(DEFAULT_PRESET), load_shipped_model(DEFAULT_PRESET)
     return {**can_sources(), **calibration_source(preset, model)}
+
+
+def everything_regenerated() -> dict[str, str]:
+    return {**regenerated(), **can_names(), "can.md": can_document(FIRMWARE)}
 
 
 def test_checked_in_sources_are_what_the_generator_writes() -> None:
@@ -40,13 +45,18 @@ def test_checked_in_document_of_the_bus_is_what_the_generator_writes() -> None:
     assert written == can_document(FIRMWARE), "run 'make generate'"
 
 
+def test_checked_in_names_of_the_bus_are_what_the_generator_writes() -> None:
+    ((name, text),) = can_names().items()
+    written = ROOT / "hil_sim" / "bus" / name
+    assert written.read_text(encoding="utf-8") == text, "run 'make generate'"
+
+
 def test_generation_is_deterministic() -> None:
-    assert regenerated() == regenerated()
-    assert can_document(FIRMWARE) == can_document(FIRMWARE)
+    assert everything_regenerated() == everything_regenerated()
 
 
 def test_generated_files_say_where_they_come_from_and_carry_no_date() -> None:
-    for name, text in regenerated().items():
+    for name, text in {**regenerated(), **can_names()}.items():
         head = text[:600].lower()
         assert "generated" in head, name
         assert "202" not in head.split("sha-256")[0], name

@@ -3,10 +3,10 @@
 import pytest
 
 from hil_sim.bus.buses import Frame, open_bus
-from hil_sim.bus.identifiers import SYNC_ID
+from hil_sim.bus.catalog import FrameId
 from hil_sim.nodes.ecu import EcuNode
 
-SYNC = Frame(SYNC_ID, b"")
+SYNC = Frame(FrameId.SYNC, b"")
 POLL_S = 0.01
 
 
@@ -58,7 +58,7 @@ def received(bus):
 
 
 def test_sync_is_the_identifier_of_the_database(database):
-    assert database["SYNC"].frame_id == SYNC_ID
+    assert database["SYNC"].frame_id == FrameId.SYNC
 
 
 def test_it_steps_once_for_each_sync_after_all_that_came_before(connected):

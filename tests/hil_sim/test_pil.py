@@ -16,6 +16,7 @@ from bms.errors import BusError, InputError, ModelMismatchError
 from bms.firmware import Ecu
 from bms.model.model_file import load_model, shipped_model_path
 from bms.model.pair import load_pair
+from hil_sim.bus.catalog import FrameId
 from hil_sim.logs.recorder import Recorder
 from hil_sim.nodes.line_losses import LOSS_ID
 from hil_sim.run.session import Settings, run_both, run_on_clocks, run_plant, run_sil
@@ -27,7 +28,6 @@ from tests.hil_sim.lines import Line, frame, text
 
 SEED = 5
 BOARD = "mps2-an386"
-SYNC_ID = 0x080
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +109,7 @@ class Serial:
         if received is None:
             return b""
         self._ecu.receive(*received)
-        if received[0] != SYNC_ID:
+        if received[0] != FrameId.SYNC:
             return b""
         self._ecu.step()
         said = [one for one in self._ecu.transmit() if one[0] not in self._silent_ids]

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from hil_sim.bus.buses import Frame
 from hil_sim.bus.e2e import Sender
-from hil_sim.bus.identifiers import MEASUREMENT_ID
-from hil_sim.nodes.ecu import PHASE_PERIODS, EcuNode
+from hil_sim.nodes.ecu import MEASUREMENT_ID, PHASE_PERIODS, EcuNode
 from hil_sim.nodes.plant import PlantNode, Request
 from hil_sim.nodes.punctuality import Slots, Spread
 from hil_sim.nodes.turns import LockStep, OnClock, PacedLockStep

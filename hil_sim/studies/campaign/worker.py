@@ -9,6 +9,7 @@ from typing import Any
 
 from bms.cell import CellState
 from bms.presets import Preset
+from hil_sim.bus.catalog import FirstFault
 from hil_sim.studies.campaign.draws import Draw, draw
 from hil_sim.studies.campaign.engine import (
     CONTROLLERS,
@@ -22,7 +23,6 @@ from hil_sim.studies.campaign.settings import CampaignSettings
 
 BLOCK_PERIODS = 1000
 FIRMWARE = "kan-rcbf"
-_NO_FAULT = 255
 
 Row = dict[str, Any]
 
@@ -157,7 +157,7 @@ def _row(preset: Preset, run: int, drawn: Draw, charges: dict[str, CampaignCharg
         and slope_K_per_s2 <= bounds.surface_rate_K_per_s2
     )
     return row | {
-        "first_fault": "" if fields.first_fault == _NO_FAULT else fields.first_fault,
+        "first_fault": "" if fields.first_fault == FirstFault.NONE else fields.first_fault,
         "infeasible_periods": fields.infeasible_periods,
         "max_estimate_error_K": fields.peaks.estimate_error_K,
         "core_model_error_K_per_s": error.core,
