@@ -2,10 +2,12 @@
 
 #include <stddef.h>
 
+#include "can_db.h"
 #include "port.h"
 
 #define MS_PER_S 1000.0f
 #define DEFAULT_PERIOD_MS 100u
+#define MEASUREMENT_ID CAN_DB_CELL_ELECTRICAL_FRAME_ID /* with which a period begins */
 
 static bool is_reached(uint32_t now_ms, uint32_t due_ms)
 {
@@ -64,9 +66,10 @@ static void take(ecu_loop_t *loop, const can_frame_t *frame)
         loop->due_ms = port_time_ms() + loop->period_ms / 2u;
         loop->is_started = true;
     }
-    if ((frame->id == ECU_LOOP_SYNC_ID) && (loop->is_in_lock_step || !is_charging(&loop->bms))) {
+    if ((frame->id == CAN_DB_SYNC_FRAME_ID) &&
+        (loop->is_in_lock_step || !is_charging(&loop->bms))) {
         take_sync(loop);
-    } else if ((frame->id == ECU_LOOP_MEASUREMENT_ID) && !loop->is_in_lock_step) {
+    } else if ((frame->id == MEASUREMENT_ID) && !loop->is_in_lock_step) {
         take_measurement(loop);
     }
 }

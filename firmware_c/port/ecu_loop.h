@@ -17,9 +17,7 @@
 
 #include "bms.h"
 
-#define ECU_LOOP_SYNC_ID 0x080u /* CiA 301 */
 #define ECU_LOOP_SYNC_SILENCE_MS 5000u
-#define ECU_LOOP_MEASUREMENT_ID 0x100u /* CellElectrical, with which a period begins */
 #define ECU_LOOP_PHASE_PERIODS 20u
 
 typedef struct {

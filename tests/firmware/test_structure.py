@@ -28,6 +28,31 @@ def test_no_warning(compiler: str, source: Path) -> None:
     subprocess.run([compiler, *WARNINGS, *INCLUDES, "-fsyntax-only", source], check=True)
 
 
+@pytest.mark.parametrize(
+    ("header", "number", "other"),
+    [
+        ("bms.h", "BMS_DERATED = 3", "BMS_DERATED = 6"),
+        ("codec.h", "REQUEST_CHARGE = 1", "REQUEST_CHARGE = 2"),
+        ("rcbf.h", "RCBF_INVALID = 6", "RCBF_INVALID = 7"),
+        ("monitor.h", "FAULT_SURFACE_DEFICIT = 19", "FAULT_SURFACE_DEFICIT = 20"),
+        ("monitor.h", "FAULT_NONE 255", "FAULT_NONE 254"),
+        ("e2e.h", "E2E_VALID = 2, E2E_INVALID = 3", "E2E_VALID = 3, E2E_INVALID = 2"),
+    ],
+)
+def test_a_number_that_is_not_the_database_s_does_not_compile(
+    tmp_path: Path, header: str, number: str, other: str
+) -> None:
+    text = (FIRMWARE / "include" / header).read_text()
+    assert number in text
+    shutil.copytree(FIRMWARE / "include", tmp_path, dirs_exist_ok=True)
+    (tmp_path / header).write_text(text.replace(number, other))
+    command = ["gcc", *WARNINGS, f"-I{tmp_path}", *INCLUDES, "-fsyntax-only"]
+    command.append(str(FIRMWARE / "src" / "choices.c"))
+    done = subprocess.run(command, check=False, capture_output=True)
+    assert done.returncode != 0
+    assert f"{number.partition(" ")[0]}_is_".encode() in done.stderr
+
+
 @pytest.fixture(scope="module")
 def symbols(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, str, str]]:
     """(object, kind, name) of every symbol, kind as `nm` prints it."""

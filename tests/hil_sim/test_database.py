@@ -9,6 +9,7 @@ from cantools import autosar
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hil_sim.bus import catalog
 from hil_sim.bus.database import load_database
 from hil_sim.bus.e2e import Receiver, Sender
 
@@ -38,6 +39,29 @@ def message_values(draw, names=tuple(CODECS)):
         raw = draw(st.integers(0, highest))
         values[signal_name] = raw * signal.scale + signal.offset
     return name, values
+
+
+def test_catalog_has_every_message_under_its_name_and_identifier():
+    ids = {getattr(catalog.Message, entry.name): entry.value for entry in catalog.FrameId}
+    assert ids == {message.name: message.frame_id for message in ORACLE.messages}
+
+
+@pytest.mark.parametrize(
+    ("message", "signal", "table"),
+    [
+        ("ChargeRequest", "Request", catalog.Request),
+        ("ChargeCommand", "CommandState", catalog.CommandState),
+        ("Diagnostics", "DiagnosticState", catalog.CommandState),
+        ("Diagnostics", "FirstFault", catalog.FirstFault),
+        ("Decision", "ActiveConstraint", catalog.ActiveConstraint),
+        ("NetworkDiagnostics", "ReportedState", catalog.ReportedState),
+    ],
+)
+def test_catalog_has_every_named_value_with_its_number(message, signal, table):
+    names = {n: str(name) for n, name in signal_of(message, signal).choices.items()}
+    assert {entry.value: entry.name.replace("_", "").lower() for entry in table} == {
+        n: name.lower() for n, name in names.items()
+    }
 
 
 @given(message_values(), st.integers(0, 15))
