@@ -2,7 +2,8 @@
 
 The declarations are read from the headers themselves, so that binding and C cannot differ. Every
 extension knows the hash of the sources that it was built from. tools/native_extensions.py gives
-them to setuptools; `python -m bms.native_build --help` builds variants of the firmware.
+them to setuptools; `python -m bms.native_build --help` builds variants of the firmware, which
+`load_build` puts in the place of the installed one.
 """
 
 from __future__ import annotations
@@ -10,18 +11,24 @@ from __future__ import annotations
 import argparse
 import hashlib
 import re
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.machinery import EXTENSION_SUFFIXES
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
 from cffi import FFI
+
+from bms.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[1]
 """Where bms, codegen, hil_sim and firmware_c lie: a repository, or a folder of packages."""
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno")
 SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
+_REMEDY = "make one with 'python -m bms.native_build --tree TREE --out FOLDER'"
 _HASH_DECLARATION = "const char *native_source_hash(void);"
 
 
@@ -78,6 +85,32 @@ class NativeExtension:
         """Whether a loaded extension was built from other sources than those that lie here now."""
         built_from: bytes = extension.ffi.string(extension.lib.native_source_hash())
         return built_from.decode() != self.source_hash()
+
+    def find_build(self, folder: Path) -> Path:
+        """The extension in a folder that a variant was built into; InputError without one."""
+        place = folder.joinpath(*self.module.split("."))
+        for suffix in EXTENSION_SUFFIXES:  # those of other Python versions may lie beside it
+            path = place.with_name(place.name + suffix)
+            if path.is_file():
+                return path.resolve()
+        raise InputError(f"{folder}: not a build of the firmware; {_REMEDY}")
+
+    def load_build(self, folder: Path) -> None:
+        """Put the variant in a folder in the place of the installed extension.
+
+        To be called before anybody imports that. Raises InputError when there is no variant, or it
+        cannot be loaded.
+        """
+        spec = spec_from_file_location(self.module, self.find_build(folder))
+        assert spec is not None and spec.loader is not None
+        assert self.module not in sys.modules, "too late: another build is loaded already"
+        try:
+            module = module_from_spec(spec)
+            spec.loader.exec_module(module)
+        except ImportError as error:
+            reason = " ".join(str(error).split())
+            raise InputError(f"{folder}: cannot be loaded ({reason}); {_REMEDY}") from None
+        sys.modules[self.module] = module
 
 
 def _core(*folders: str) -> tuple[str, ...]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from importlib import import_module
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
@@ -22,7 +21,6 @@ settings.register_profile("no_deadline", deadline=None)
 settings.load_profile("no_deadline")
 
 Command = Callable[..., tuple[int, str, str]]
-EXTENSION = FIRMWARE.module
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -38,24 +36,13 @@ def pytest_configure(config: pytest.Config) -> None:
     """Put a variant in the place of the installed extension; refuse extensions of other sources."""
     folder = config.getoption("--firmware-build")
     if folder is not None:
-        _use_variant(folder)
+        FIRMWARE.load_build(folder)
     for extension in (RIVALS, RUNNER) if folder is not None else (FIRMWARE, RIVALS, RUNNER):
         if extension.is_stale(import_module(extension.module)):
             raise pytest.UsageError(
                 f"{extension.module} was built from other C sources than lie here now; "
                 "run 'make build'"
             )
-
-
-def _use_variant(folder: Path) -> None:
-    """Before anybody imports the installed one."""
-    (path,) = (folder / "bms" / "firmware").glob("_firmware*.so")
-    spec = spec_from_file_location(EXTENSION, path.resolve())
-    assert spec is not None and spec.loader is not None
-    assert EXTENSION not in sys.modules, "too late: the installed extension is imported already"
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    sys.modules[EXTENSION] = module
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -95,4 +82,4 @@ def bms(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
 
 def pytest_report_header() -> str:
     import_module("bms.firmware")
-    return f"firmware: {sys.modules[EXTENSION].__file__}"
+    return f"firmware: {sys.modules[FIRMWARE.module].__file__}"

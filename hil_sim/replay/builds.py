@@ -12,13 +12,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from bms.errors import InputError
+from bms.native_build import FIRMWARE
 from hil_sim.bus.buses import Frame
 from hil_sim.logs import log_suffixes
 from hil_sim.replay.comparison import Comparison, compare
 from hil_sim.replay.outcome import outcome
 from hil_sim.replay.recording import Answer, load_recording
 from hil_sim.replay.signals import Signals
-from hil_sim.replay.worker import UNUSABLE, find_extension
+from hil_sim.replay.worker import UNUSABLE
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def compare_builds(
     Raises InputError for a build or log that cannot be used.
     """
     for build in builds:
-        find_extension(build)
+        FIRMWARE.find_build(build)
     with ThreadPoolExecutor(len(builds)) as pool:
         both = list(pool.map(lambda build: _answers(build, logs, preset, model), builds))
     return [_verdict(log, one, other) for log, one, other in zip(logs, *both)]

@@ -11,41 +11,15 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from importlib.machinery import EXTENSION_SUFFIXES
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
-from bms.errors import BmsError, InputError
+from bms.errors import BmsError
+from bms.native_build import FIRMWARE
 from hil_sim.replay.engine import replay
 from hil_sim.replay.recording import load_recording
 
-EXTENSION = "bms.firmware._firmware"
 UNUSABLE = 2
 """Exit code when a build or log cannot be used and stderr says why."""
-REMEDY = "make one with 'python -m bms.native_build --tree TREE --out FOLDER'"
-
-
-def find_extension(folder: Path) -> Path:
-    """The extension of a build; InputError when it is none."""
-    for suffix in EXTENSION_SUFFIXES:  # those of other Python versions may lie beside it
-        path = folder / "bms" / "firmware" / f"_firmware{suffix}"
-        if path.is_file():
-            return path.resolve()
-    raise InputError(f"{folder}: not a build of the firmware; {REMEDY}")
-
-
-def load_build(folder: Path) -> None:
-    """Put the extension of a build in the place of the installed one; InputError if it cannot."""
-    spec = spec_from_file_location(EXTENSION, find_extension(folder))
-    assert spec is not None and spec.loader is not None
-    assert EXTENSION not in sys.modules, "too late: another build is loaded already"
-    try:
-        module = module_from_spec(spec)
-        spec.loader.exec_module(module)
-    except ImportError as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{folder}: cannot be loaded ({reason}); {REMEDY}") from None
-    sys.modules[EXTENSION] = module
 
 
 def main() -> None:
@@ -58,7 +32,7 @@ def main() -> None:
     parser.add_argument("logs", type=Path, nargs="+")
     arguments = parser.parse_args()
     try:
-        load_build(arguments.build)
+        FIRMWARE.load_build(arguments.build)
         answers = [_replay(log, arguments.preset, arguments.model) for log in arguments.logs]
     except BmsError as error:
         print(error, file=sys.stderr)

@@ -48,9 +48,10 @@ def test_a_number_that_is_not_the_database_s_does_not_compile(
     (tmp_path / header).write_text(text.replace(number, other))
     command = ["gcc", *WARNINGS, f"-I{tmp_path}", *INCLUDES, "-fsyntax-only"]
     command.append(str(FIRMWARE / "src" / "choices.c"))
-    done = subprocess.run(command, check=False, capture_output=True)
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    name, _, _ = number.partition(" ")
     assert done.returncode != 0
-    assert f"{number.partition(" ")[0]}_is_".encode() in done.stderr
+    assert f"{name}_is_" in done.stderr
 
 
 @pytest.fixture(scope="module")
