@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from hil_sim.fault_matrix.matrix import Reaction, Row, fault_numbers
-from hil_sim.run.result import RunResult, TimeSeries
+from hil_sim.run.result import RunResult
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class _Seen:
     """The periods of a run from its fault on, number 1 first."""
 
     def __init__(self, row: Row, result: RunResult) -> None:
-        series, period_s = result.series, _period_s(result.series)
-        window = row.fault.window(period_s)
-        begin = next(i for i, t in enumerate(series.time_s) if t > (window.start - 0.5) * period_s)
+        series = result.series
+        window = row.fault.window(series.period_s)
+        begin = series.charge_period.index(window.start)
         self.end = len(window) if not row.fault.is_for_good else len(series.time_s) - begin
         self.flowing_A = series.current_A[begin:]
         self.command_A = series.usable_command_A[begin:]
@@ -147,7 +147,3 @@ def _number(conditions: Sequence[bool], first: int = 1) -> int | None:
 
 def _last(states: Sequence[str | None]) -> str | None:
     return next((state for state in reversed(states) if state is not None), None)
-
-
-def _period_s(series: TimeSeries) -> float:
-    return series.time_s[1] - series.time_s[0]

@@ -52,7 +52,7 @@ class Charge:
     progress: Progress = lambda soc: None
 
     def __post_init__(self) -> None:
-        self.series = TimeSeries()
+        self.series = TimeSeries(self._period_s)
         self.steps = 0
         self.identity: Identity | None = None
         self._heard_identity: Identity | None = None
@@ -128,7 +128,9 @@ class Charge:
     def _note(self, answer: Answer) -> None:
         plant, begin = self.plant, self._edge if self._edge is not None else OFF_PERIODS
         time_s = (self.steps - begin) * self._period_s
-        self.series.append(time_s, plant.state, plant.current_A, plant.voltage_V, answer)
+        self.series.append(
+            self._charge_period, time_s, plant.state, plant.current_A, plant.voltage_V, answer
+        )
         self._silent_periods = 0 if answer.command_A is not None else self._silent_periods + 1
         if self._edge is not None and answer.value("ErrorBound") is not None:
             self.error_bound_K = answer.value("ErrorBound")

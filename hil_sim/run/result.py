@@ -17,13 +17,16 @@ from hil_sim.nodes.punctuality import PlantWatch, Timing
 
 @dataclass
 class TimeSeries:
-    """One entry a control period; the time is 0 at the start of the charge.
+    """One entry a control period of period_s; the time is 0 at the start of the charge.
 
     Temperatures and state of charge are true values at the start of the period, current and
     voltage those that the charger applies from then on. The estimate is None where the ECU gave
     none.
     """
 
+    period_s: float
+    charge_period: list[int | None] = field(default_factory=list)
+    """Number of the period, 0 at the start of the charge; None before that."""
     time_s: list[float] = field(default_factory=list)
     current_A: list[float] = field(default_factory=list)
     voltage_V: list[float] = field(default_factory=list)
@@ -42,9 +45,16 @@ class TimeSeries:
     latched_faults: list[int | None] = field(default_factory=list)
 
     def append(
-        self, time_s: float, state: CellState, current_A: float, voltage_V: float, answer: Answer
+        self,
+        charge_period: int | None,
+        time_s: float,
+        state: CellState,
+        current_A: float,
+        voltage_V: float,
+        answer: Answer,
     ) -> None:
         """Add a period: what is true at its start, and what the ECU answered."""
+        self.charge_period.append(charge_period)
         self.time_s.append(time_s)
         self.current_A.append(current_A)
         self.voltage_V.append(voltage_V)

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import pytest
 
 from bms.errors import InputError
+from bms.model.model_file import shipped_model_path
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
 from hil_sim.bus.database import load_database
@@ -149,6 +150,15 @@ def test_what_does_not_go_as_the_row_says_is_red(name, expect, said):
     verdict = play(SETTINGS, replace(named(name), expect=Expectation(**expect)))
     assert not verdict.passed
     assert said in "; ".join(verdict.failures)
+
+
+def test_periods_count_from_the_fault_also_when_an_estimator_with_memory_has_to_settle_first():
+    model = shipped_model_path(DEFAULT_PRESET).with_name(f"{DEFAULT_PRESET}_lagged.json")
+    slow_to_start = MatrixSettings(*load_pair(DEFAULT_PRESET, model), "virtual:matrix")
+    row = named("charger ignores commands")
+    verdict = play(slow_to_start, row)
+    assert verdict.failures == ()
+    assert verdict.latched_period == play(SETTINGS, row).latched_period == 8
 
 
 def test_a_limit_of_the_plant_that_is_crossed_is_red():
