@@ -113,19 +113,19 @@ def require_shared(name: str) -> None:
         )
 
 
-def is_line(name: str) -> bool:
+def is_serial_line(name: str) -> bool:
     """Whether the bus is a line with one end here, so that an ECU can only be at the other one."""
     return name.startswith(f"slcan:{SCHEME}")
 
 
 def require_room_for_ecu(name: str) -> None:
     """Raise InputError for a line or an adapter, which plant and ECU cannot share."""
-    if name.startswith("slcan:") and not is_line(name):
+    if name.startswith("slcan:") and not is_serial_line(name):
         raise InputError(
             f"bus '{name}': one adapter is one party; use 'bms plant', and 'bms ecu' or the ECU at "
             "another adapter, or a bus such as virtual:bms"
         )
-    if is_line(name):
+    if is_serial_line(name):
         raise InputError(
             f"bus '{name}': has one end here, and the ECU is at the other; use 'bms sil' or "
             "'bms plant', or a bus such as virtual:bms"
@@ -134,7 +134,7 @@ def require_room_for_ecu(name: str) -> None:
 
 def ecu_remedy(name: str) -> str:
     """What to do when no ECU answers on a bus."""
-    if is_line(name):
+    if is_serial_line(name):
         return "see that an image with this firmware runs at its other end; 'make pil' starts one"
     return f"start 'bms ecu --bus {name}'"
 

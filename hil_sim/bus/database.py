@@ -114,7 +114,7 @@ def profile2_crc(payload: bytes | bytearray, data_id: int) -> int:
     return _CRC_TABLE[crc ^ data_id] ^ 0xFF
 
 
-def load_database() -> dict[str, MessageCodec]:
+def load_codecs() -> dict[str, MessageCodec]:
     """Every message of the project's CAN database by name."""
     return {m.name: MessageCodec(m) for m in can_database.load_database().messages}
 

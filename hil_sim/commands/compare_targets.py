@@ -25,7 +25,7 @@ from hil_sim.commands.replay_output import first_json, first_table
 from hil_sim.fault_matrix.matrix import Row, load_matrix
 from hil_sim.fault_matrix.runner import MatrixSettings
 from hil_sim.replay.signals import Signals
-from hil_sim.targets.agreement import Agreement, FrameDifference, compare_targets
+from hil_sim.targets.agreement import Agreement, FrameDifference, agreements_with_host
 from hil_sim.targets.catalog import BUILD, NAMES, find_target
 from hil_sim.targets.scenarios import (
     Scenario,
@@ -37,7 +37,7 @@ from hil_sim.targets.scenarios import (
 HOST = "host"
 
 
-def compare(
+def compare_targets(
     logs: Annotated[
         list[Path] | None,
         typer.Argument(
@@ -93,7 +93,7 @@ def compare(
         count = len(logs) if logs else 1 + len(playable)
         task = bar.add_task("runs", total=count * (len(targets) + (not logs)))
         scenarios = recorded or _recorded(seed, playable, bar, task)
-        agreements = compare_targets(targets, scenarios, lambda: bar.advance(task))
+        agreements = agreements_with_host(targets, scenarios, lambda: bar.advance(task))
     if json:
         print(json_format.dumps(_json(scenarios, agreements, left_out), indent=2))
     else:

@@ -13,7 +13,7 @@ from hil_sim.bus.buses import open_bus, require_shared
 from hil_sim.commands.stopping import stop_event
 from hil_sim.nodes.clock import WallClock
 from hil_sim.nodes.ecu import EcuNode
-from hil_sim.nodes.punctuality import Slots, Spread
+from hil_sim.nodes.punctuality import Slots, TimeStatistics
 
 
 def ecu(
@@ -62,7 +62,7 @@ def ecu(
 def _punctuality(slots: Slots) -> str:
     stall_ms, deadline_ms = 1000.0 * slots.longest_stall_s, 1000.0 * slots.deadline_s
     return (
-        f"steps began late by: {Spread.of(slots.late_s)}\n"
+        f"steps began late by: {TimeStatistics.of(slots.late_s)}\n"
         f"deadlines missed: {slots.missed} (allowed: {deadline_ms:g} ms), "
         f"steps left out: {slots.skipped}, longest stall: {stall_ms:.2f} ms"
     )

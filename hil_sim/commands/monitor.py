@@ -11,14 +11,14 @@ from rich.console import Console
 from rich.live import Live
 
 from hil_sim.bus.buses import require_shared
-from hil_sim.bus.database import load_database
+from hil_sim.bus.database import load_codecs
 from hil_sim.commands.stopping import stop_event
 from hil_sim.monitor.keyboard import Keyboard
-from hil_sim.monitor.line import status_line
 from hil_sim.monitor.listener import Listener
 from hil_sim.monitor.model import Snapshot, SystemModel
 from hil_sim.monitor.presets import preset_finder
 from hil_sim.monitor.screen import Screen
+from hil_sim.monitor.status_line import status_line
 from hil_sim.monitor.watch import watch
 from hil_sim.nodes.clock import WallClock
 
@@ -53,7 +53,7 @@ def monitor(
     """
     require_shared(bus)
     finder = preset_finder(preset)
-    model = SystemModel(load_database())
+    model = SystemModel(load_codecs())
     clock = WallClock()
     stop = stop_event()
     start_s = clock.now_s()

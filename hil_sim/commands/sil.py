@@ -11,7 +11,7 @@ import typer
 from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.presets import load_preset
-from hil_sim.bus.buses import is_line
+from hil_sim.bus.buses import is_serial_line
 from hil_sim.commands import options
 from hil_sim.commands.outcome import charge_and_report
 from hil_sim.faults import load_faults
@@ -64,7 +64,7 @@ def sil(
             if bus != Settings.bus:
                 raise InputError(f"--bus {bus}: --target brings a bus of its own; give one of both")
             bus = stack.enter_context(find_board(target).start()).bus
-        is_remote = is_line(bus)
+        is_remote = is_serial_line(bus)
         if is_remote and controller is not ControllerKind.KAN_RCBF:
             raise InputError(
                 f"--controller {controller.value}: on '{bus}' the ECU at the other end controls; "

@@ -14,7 +14,7 @@ from annotated_types import Ge, Le, Len
 from bms.errors import InputError
 from bms.validation import Positive, parse, read_toml, strict
 from hil_sim.bus.catalog import FirstFault, ReceivedName
-from hil_sim.bus.database import MessageCodec, load_database
+from hil_sim.bus.database import MessageCodec, load_codecs
 from hil_sim.faults.base import Fault
 from hil_sim.faults.frames import MessageName
 from hil_sim.faults.plan import check, parse_fault
@@ -133,7 +133,7 @@ def load_matrix(path: Path | None = None) -> tuple[Row, ...]:
     """
     path = path or matrix_path()
     matrix = parse(_Matrix, read_toml(path), str(path))
-    database = load_database()
+    database = load_codecs()
     rows = tuple(row for text in matrix.row for row in _expanded(text, matrix, database, str(path)))
     names = [row.name for row in rows]
     for name in names:

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from bms.errors import InputError
 from bms.validation import parse, read_toml, strict
-from hil_sim.bus.database import MessageCodec, load_database
+from hil_sim.bus.database import MessageCodec, load_codecs
 from hil_sim.faults.base import Fault
 from hil_sim.faults.clocks import CLOCK_FAULTS
 from hil_sim.faults.ecu import ECU_FAULTS
@@ -48,7 +48,7 @@ def load_faults(path: Path) -> tuple[Fault, ...]:
         if isinstance(table, dict) and "kind" not in table:
             raise InputError(f"{path}: fault.{number}: no kind; give one, such as 'message-lost'")
     faults = cast("tuple[Fault, ...]", parse(_File, content, str(path)).fault)
-    database = load_database()
+    database = load_codecs()
     for number, fault in enumerate(faults):
         check(fault, database, f"{path}: fault.{number}")
     return faults

@@ -20,8 +20,8 @@ def core_estimate(snapshot: Snapshot) -> str:
     core, bound = snapshot.readings["CoreTemperature"], snapshot.readings["ErrorBound"]
     if core.value is None:
         return NOT_AVAILABLE
-    spread = "" if bound.value is None else f" ± {bound.value:.2f}"
-    return f"{core.value:.2f}{spread} K"
+    error = "" if bound.value is None else f" ± {bound.value:.2f}"
+    return f"{core.value:.2f}{error} K"
 
 
 def interval(snapshot: Snapshot) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from bms.errors import BusError
 from bms.firmware import Reception, ReceptionCounts
 from hil_sim.bus import catalog
-from hil_sim.bus.buses import CanBus, Frame, ecu_remedy, is_line
+from hil_sim.bus.buses import CanBus, Frame, ecu_remedy, is_serial_line
 from hil_sim.bus.catalog import Message
 from hil_sim.bus.database import COUNTER_MODULUS, MessageCodec, Values
 from hil_sim.bus.e2e import Receiver, Sender
@@ -150,7 +150,7 @@ class PlantNode:
         """When the frames were published last, in s, and what was heard since."""
         sent_s, heard = 0.0, list[StampedFrame]()
         for attempt in range(CONNECT_ATTEMPTS):
-            if attempt == 0 or not is_line(self._bus.name):
+            if attempt == 0 or not is_serial_line(self._bus.name):
                 sent_s, heard = self._publish(period, frames), []
             heard += self._listen(period)
             self._is_connected = self._is_connected or self._is_answered(heard)

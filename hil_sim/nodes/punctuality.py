@@ -62,7 +62,7 @@ class Slots:
 
 
 @dataclass(frozen=True)
-class Spread:
+class TimeStatistics:
     """How times are spread, in ms. The jitter is their standard deviation, p99 is one of them."""
 
     median_ms: float
@@ -71,7 +71,7 @@ class Spread:
     jitter_ms: float
 
     @classmethod
-    def of(cls, times_s: Sequence[float]) -> Spread | None:
+    def of(cls, times_s: Sequence[float]) -> TimeStatistics | None:
         """None of no times at all."""
         if not times_s:
             return None
@@ -104,8 +104,8 @@ class Timing:
     deadline_ms: float
     periods: int
     missed_deadlines: int
-    lateness: Spread | None
-    answer_latency: Spread | None
+    lateness: TimeStatistics | None
+    answer_latency: TimeStatistics | None
     periods_without_command: int
     longest_without_command_periods: int
 
@@ -145,8 +145,8 @@ class PlantWatch:
             deadline_ms=slots.deadline_s * _MS_PER_S,
             periods=len(slots.late_s),
             missed_deadlines=slots.missed,
-            lateness=Spread.of(slots.late_s),
-            answer_latency=Spread.of(self.latency_s),
+            lateness=TimeStatistics.of(slots.late_s),
+            answer_latency=TimeStatistics.of(self.latency_s),
             periods_without_command=sum(silences),
             longest_without_command_periods=max(silences, default=0),
         )

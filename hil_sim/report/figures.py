@@ -9,7 +9,7 @@ from hil_sim.run.result import CHARGING_STATES, RunResult, Summary
 
 
 class Figure(NamedTuple):
-    """One line: what, one text for each run, the limit as text, and for each run whether kept."""
+    """One row: what, one text for each run, the limit as text, and for each run whether kept."""
 
     name: str
     values: list[str]
@@ -18,9 +18,9 @@ class Figure(NamedTuple):
 
 
 def figures(limits: Limits, results: list[RunResult]) -> list[Figure]:
-    """Lines of the table, limits first."""
+    """Rows of the table, limits first."""
     summaries = [result.summary for result in results]
-    lines = [
+    rows = [
         _limited(
             "Peak core temperature",
             "max_core_temperature_K",
@@ -52,13 +52,13 @@ def figures(limits: Limits, results: list[RunResult]) -> list[Figure]:
     )
     for name, key, pattern in free:
         values = [_text(getattr(summary, key), pattern) for summary in summaries]
-        lines.append(Figure(name, values, "", [None] * len(values)))
+        rows.append(Figure(name, values, "", [None] * len(values)))
     losses = [summary.line_losses for summary in summaries]
     if any(loss is not None for loss in losses):
         texts = [_text(None if loss is None else loss.total, "{}") for loss in losses]
         kept = [None if loss is None else loss.total == 0 for loss in losses]
-        lines.append(Figure("Frames lost on the serial line", texts, "0", kept))
-    return lines
+        rows.append(Figure("Frames lost on the serial line", texts, "0", kept))
+    return rows
 
 
 def _limited(name: str, key: str, limit: float, pattern: str, summaries: list[Summary]) -> Figure:

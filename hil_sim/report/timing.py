@@ -1,4 +1,4 @@
-"""How punctual a real-time run was, as lines of a table and as a histogram."""
+"""How punctual a real-time run was, as rows of a table and as a histogram."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from hil_sim.nodes.punctuality import PlantWatch, Spread, Timing
+from hil_sim.nodes.punctuality import PlantWatch, TimeStatistics, Timing
 from hil_sim.report.chart import CONTROLLER_COLOURS, png
 from hil_sim.report.figures import Figure
 from hil_sim.run.result import RunResult
@@ -19,46 +19,46 @@ _MS_PER_S = 1000.0
 
 
 def timing_figures(results: Sequence[RunResult]) -> list[Figure]:
-    """Lines of the table; none when no run was in real time."""
+    """Rows of the table; none when no run was in real time."""
     timings = [result.summary.timing for result in results]
     known = next((timing for timing in timings if timing is not None), None)
     if known is None:
         return []
-    line = partial(_line, timings)
+    row = partial(_row, timings)
     return [
-        line("Measurements begin late: median", lambda timing: _ms(timing.lateness, "median_ms")),
-        line("Measurements begin late: 99 %", lambda timing: _ms(timing.lateness, "p99_ms")),
-        line(
+        row("Measurements begin late: median", lambda timing: _ms(timing.lateness, "median_ms")),
+        row("Measurements begin late: 99 %", lambda timing: _ms(timing.lateness, "p99_ms")),
+        row(
             "Measurements begin late: largest",
             lambda timing: _ms(timing.lateness, "max_ms"),
             f"{known.deadline_ms:g} ms",
         ),
-        line("Measurements begin late: jitter", lambda timing: _ms(timing.lateness, "jitter_ms")),
-        line(
+        row("Measurements begin late: jitter", lambda timing: _ms(timing.lateness, "jitter_ms")),
+        row(
             "Deadlines missed",
             lambda timing: f"{timing.missed_deadlines} of {timing.periods}",
         ),
-        line("Command after: median", lambda timing: _ms(timing.answer_latency, "median_ms")),
-        line("Command after: 99 %", lambda timing: _ms(timing.answer_latency, "p99_ms")),
-        line("Command after: largest", lambda timing: _ms(timing.answer_latency, "max_ms")),
-        line("Command after: jitter", lambda timing: _ms(timing.answer_latency, "jitter_ms")),
-        line(
+        row("Command after: median", lambda timing: _ms(timing.answer_latency, "median_ms")),
+        row("Command after: 99 %", lambda timing: _ms(timing.answer_latency, "p99_ms")),
+        row("Command after: largest", lambda timing: _ms(timing.answer_latency, "max_ms")),
+        row("Command after: jitter", lambda timing: _ms(timing.answer_latency, "jitter_ms")),
+        row(
             "Periods without a new command",
             lambda timing: f"{timing.periods_without_command}",
         ),
-        line("Most of them in a row", lambda timing: f"{timing.longest_without_command_periods}"),
+        row("Most of them in a row", lambda timing: f"{timing.longest_without_command_periods}"),
     ]
 
 
-def _line(
+def _row(
     timings: Sequence[Timing | None], name: str, text: Callable[[Timing], str], limit: str = ""
 ) -> Figure:
     values = ["–" if timing is None else text(timing) for timing in timings]
     return Figure(name, values, limit, [None] * len(values))
 
 
-def _ms(spread: Spread | None, name: str) -> str:
-    return "–" if spread is None else f"{getattr(spread, name):.2f} ms"
+def _ms(times: TimeStatistics | None, name: str) -> str:
+    return "–" if times is None else f"{getattr(times, name):.2f} ms"
 
 
 def timing_chart(watch: PlantWatch) -> bytes:

@@ -18,8 +18,8 @@ from bms.firmware import Ecu
 from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.presets.schema import Initial
-from hil_sim.bus.buses import CanBus, is_line, open_bus, require_room_for_ecu, require_shared
-from hil_sim.bus.database import MessageCodec, load_database
+from hil_sim.bus.buses import CanBus, is_serial_line, open_bus, require_room_for_ecu, require_shared
+from hil_sim.bus.database import MessageCodec, load_codecs
 from hil_sim.faults import Fault, Injection
 from hil_sim.logs.recorder import Recorder
 from hil_sim.nodes.clock import WallClock
@@ -97,7 +97,7 @@ def run_both(
     `ecu_factory` replaces the controller that the settings name. Raises InputError or BusError.
     """
     require_room_for_ecu(settings.bus)
-    database = load_database()
+    database = load_codecs()
     injection = _injection(settings, database)
     with ExitStack() as stack:
         plant = _plant(settings)
@@ -127,7 +127,7 @@ def run_sil(
 
     Raises InputError, ModelMismatchError or BusError.
     """
-    if not is_line(settings.bus):
+    if not is_serial_line(settings.bus):
         return run_both(settings, recorder, progress)
     patient = replace(settings, answer_timeout_s=LINE_ANSWER_TIMEOUT_S)
     return run_plant(patient, recorder, progress)
@@ -141,7 +141,7 @@ def run_on_clocks(
     Raises InputError or BusError.
     """
     require_room_for_ecu(settings.bus)
-    database = load_database()
+    database = load_codecs()
     injection = _injection(settings, database)
     plant = _plant(settings)
     ecu = injection.ecu(lambda: _factory(settings)(plant, database))
@@ -183,7 +183,7 @@ def run_plant(
                 f"fault '{fault.kind}': happens inside the ECU, which is not in this process; "
                 "use 'bms sil' on another bus, or restart the ECU itself"
             )
-    database = load_database()
+    database = load_codecs()
     period_s = settings.preset.timing.sampling_period_s
     plant = _plant(settings)
     with open_bus(settings.bus) as bus:
@@ -265,7 +265,7 @@ def _run(
     start_s = time.perf_counter()
     reason = charge.run()
     wall_time_s = time.perf_counter() - start_s
-    if is_line(settings.bus):
+    if is_serial_line(settings.bus):
         losses.hear_out(bus)
     return _sum_up(settings, charge, reason, wall_time_s, turn.watch, losses.losses)
 
@@ -314,6 +314,6 @@ def _sum_up(
         timing=watch.timing([command is not None for command in series.command_A])
         if watch is not None
         else None,
-        line_losses=losses if is_line(settings.bus) else None,
+        line_losses=losses if is_serial_line(settings.bus) else None,
     )
     return RunResult(summary, series, watch)

@@ -40,7 +40,7 @@ class Agreement:
     """Of the first period that differs."""
 
 
-def compare_targets(
+def agreements_with_host(
     targets: Sequence[Target],
     scenarios: Sequence[Scenario],
     played: Callable[[], None] = lambda: None,

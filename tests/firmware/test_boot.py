@@ -14,7 +14,7 @@ import pytest
 from bms.firmware._firmware import lib
 
 from hil_sim.bus.buses import Frame, open_bus
-from hil_sim.bus.database import load_database
+from hil_sim.bus.database import load_codecs
 from hil_sim.bus.e2e import Receiver
 from hil_sim.targets import Emulation
 from tests.firmware.damaged_images import (
@@ -33,7 +33,7 @@ from tests.firmware.ports import ROOT, build, image, needs_emulator
 
 pytestmark = needs_emulator
 
-CODECS = load_database()
+CODECS = load_codecs()
 SPOKEN = ("Diagnostics", "Identity", "ChargeCommand")
 PARTS = {1: "APPLICATION", 2: "CALIBRATION", 3: "BOOT"}
 CALIBRATION_FAULT, FAULT_STATE = 18, 5

@@ -3,7 +3,7 @@
 import pytest
 
 from bms.presets import Preset, load_preset, preset_names
-from hil_sim.bus.database import MessageCodec, load_database
+from hil_sim.bus.database import MessageCodec, load_codecs
 
 
 @pytest.fixture(scope="session")
@@ -18,4 +18,4 @@ def any_preset(request: pytest.FixtureRequest) -> Preset:
 
 @pytest.fixture(scope="session")
 def database() -> dict[str, MessageCodec]:
-    return load_database()
+    return load_codecs()

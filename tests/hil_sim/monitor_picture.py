@@ -13,7 +13,7 @@ from pathlib import Path
 from rich.console import Console
 
 from hil_sim.bus.buses import Frame
-from hil_sim.bus.database import load_database
+from hil_sim.bus.database import load_codecs
 from hil_sim.logs import read_log
 from hil_sim.monitor.model import Snapshot, SystemModel
 from hil_sim.monitor.presets import preset_finder
@@ -27,7 +27,7 @@ COLUMNS, ROWS = 80, 24
 
 def snapshot_of(log: Path, time_s: float, age_s: float = 0.0) -> Snapshot:
     """What a monitor knew age_s after the last frame of a log up to time_s."""
-    model = SystemModel(load_database())
+    model = SystemModel(load_codecs())
     for frame in read_log(log):
         if frame.time_s <= time_s:
             model.take(frame.time_s, Frame(frame.frame_id, frame.data))

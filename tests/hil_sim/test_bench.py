@@ -19,7 +19,7 @@ from hil_sim.studies.bench import simulation
 from hil_sim.studies.bench.generated_solver import GENERATED
 from hil_sim.studies.bench.layers import sampled
 from hil_sim.studies.bench.problem import charge_problem
-from hil_sim.studies.bench.race import Absent, Clocks, Peer, Spread, WrongAnswerError, race
+from hil_sim.studies.bench.race import Absent, Clocks, Peer, Quartiles, WrongAnswerError, race
 from hil_sim.studies.bench.simulation import bus_speed
 from tests.firmware.constraints import interval, quadratics
 
@@ -46,7 +46,7 @@ def test_time_is_the_median_of_the_repetitions_for_each_answer():
     (row,) = race(RIGHT, [peer(RIGHT)], 5, lambda: next(clock))
     per_answer = [duration / 4 for duration in durations_ns]
     low, median, high = statistics.quantiles(per_answer, n=4, method="inclusive")
-    assert row.time_ns == Spread(median, low, high, 5)
+    assert row.time_ns == Quartiles(median, low, high, 5)
     assert row.answers == 4
 
 
@@ -75,7 +75,7 @@ def problem():
 
 def test_the_solvers_are_given_the_printed_constraints(problem):
     """Against the constraints as design page 1 prints them, in code of their own."""
-    for row in problem.spread(40):
+    for row in problem.sample(40):
         state = {name: column[row] for name, column in problem.states._asdict().items()}
         state["cooling_power_W"] = problem.cooling_power_W[row]
         groups = quadratics(problem.firmware.parameters, state)

@@ -9,7 +9,7 @@ from bms.errors import BusError, InputError
 from hil_sim.bus.buses import (
     Frame,
     ecu_remedy,
-    is_line,
+    is_serial_line,
     open_bus,
     require_room_for_ecu,
     require_shared,
@@ -72,8 +72,8 @@ def test_a_bus_that_cannot_be_opened_is_one_line_with_a_remedy(name, said):
 
 
 def test_an_adapter_is_on_a_bus_with_others_and_a_socket_is_a_line_with_two_ends():
-    assert is_line("slcan:socket://127.0.0.1:5000")
-    assert not is_line("slcan:/dev/ttyACM0")
+    assert is_serial_line("slcan:socket://127.0.0.1:5000")
+    assert not is_serial_line("slcan:/dev/ttyACM0")
     assert ecu_remedy("slcan:/dev/ttyACM0") == "start 'bms ecu --bus slcan:/dev/ttyACM0'"
     for name in ("slcan:/dev/ttyACM0", "slcan:socket://127.0.0.1:5000"):
         with pytest.raises(InputError, match=r"use .*'bms plant'"):

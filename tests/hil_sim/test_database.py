@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hil_sim.bus import catalog
-from hil_sim.bus.database import load_database
+from hil_sim.bus.database import load_codecs
 from hil_sim.bus.e2e import Receiver, Sender
 
 ORACLE = cantools.database.load_string(files("codegen").joinpath("can/bms.dbc").read_text(), "dbc")
-CODECS = load_database()
+CODECS = load_codecs()
 PROTECTED = [name for name, codec in CODECS.items() if codec.data_ids]
 ANALOGUE = [
     (message.name, signal.name)

@@ -10,7 +10,7 @@ import pytest
 from bms.cell import CellState
 from bms.errors import InputError
 from hil_sim.bus.buses import Frame
-from hil_sim.bus.database import load_database
+from hil_sim.bus.database import load_codecs
 from hil_sim.faults import Injection, parse_fault
 from hil_sim.plant.sensors import Readings
 from hil_sim.run.session import Settings, run_both, run_plant
@@ -29,7 +29,7 @@ def injection(*faults, seed=0, clock=None):
         [parse_fault(fault, "test") for fault in faults],
         0.1,
         np.random.SeedSequence(seed),
-        load_database(),
+        load_codecs(),
         clock,
     )
 
@@ -103,7 +103,7 @@ def test_a_sensor_that_is_not_available_is_sent_as_all_ones(name):
     sensor, message = fields[name]
     value = readings(sensor, kind="sensor-not-available")[-1]
     assert math.isnan(value)
-    codec = load_database()[message]
+    codec = load_codecs()[message]
     assert codec.decode(codec.encode({name: value}))[name] is None
     bits = int.from_bytes(codec.encode({name: value}), "little")
     assert bin(bits >> 12).count("1") >= 16

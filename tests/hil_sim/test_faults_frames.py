@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hil_sim.bus.buses import Frame
-from hil_sim.bus.database import load_database
+from hil_sim.bus.database import load_codecs
 from hil_sim.bus.e2e import Sender
 from hil_sim.faults import Injection, parse_fault
 from hil_sim.faults.frames import MessageName
 
-DATABASE = load_database()
+DATABASE = load_codecs()
 ORACLE = cantools.database.load_string(files("codegen").joinpath("can/bms.dbc").read_text(), "dbc")
 SYNC = Frame(0x080, b"")
 COMMAND = Frame(DATABASE["ChargeCommand"].frame_id, bytes(4))

@@ -13,7 +13,7 @@ from bms.errors import InputError
 from bms.model.model_file import shipped_model_path
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
-from hil_sim.bus.database import load_database
+from hil_sim.bus.database import load_codecs
 from hil_sim.fault_matrix.matrix import Expectation, fault_numbers, load_matrix, matrix_path
 from hil_sim.fault_matrix.runner import MatrixSettings, play, play_all
 from hil_sim.faults.frames import MessageFault
@@ -75,14 +75,14 @@ def test_every_fault_of_a_message_happens_to_every_message_that_is_acted_on(kind
 def test_every_byte_of_the_command_is_corrupted():
     name = "command corrupted for good"
     corrupted = {row.fault.byte for row in ROWS if row.name.startswith(name)}
-    assert corrupted == set(range(load_database()[COMMAND].length))
+    assert corrupted == set(range(load_codecs()[COMMAND].length))
 
 
 @pytest.mark.parametrize("message", RECEIVED)
 def test_every_byte_of_every_received_message_is_corrupted(message):
     once = {row.fault.byte for row in ROWS if row.name.startswith(f"corrupted once: {message} ")}
     good = {row.fault.byte for row in ROWS if row.name.startswith(f"corrupted for good: {message}")}
-    assert once == good == set(range(load_database()[message].length))
+    assert once == good == set(range(load_codecs()[message].length))
 
 
 @pytest.mark.parametrize("sensor", get_args(SensorName))

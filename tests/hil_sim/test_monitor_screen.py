@@ -12,10 +12,10 @@ from hil_sim.bus.buses import Frame
 from hil_sim.bus.e2e import Sender
 from hil_sim.monitor import wording
 from hil_sim.monitor.bar import Bar
-from hil_sim.monitor.line import status_line
 from hil_sim.monitor.listener import ForeignFrame
 from hil_sim.monitor.model import SystemModel
 from hil_sim.monitor.presets import preset_finder
+from hil_sim.monitor.status_line import status_line
 from tests.hil_sim.golden.record import FOLDER
 from tests.hil_sim.monitor_picture import PICTURE, drawn, picture, snapshot_of
 

@@ -13,7 +13,7 @@ from hil_sim.bus.buses import Frame
 from hil_sim.bus.e2e import Sender
 from hil_sim.nodes.ecu import MEASUREMENT_ID, PHASE_PERIODS, EcuNode
 from hil_sim.nodes.plant import PlantNode, Request
-from hil_sim.nodes.punctuality import Slots, Spread
+from hil_sim.nodes.punctuality import Slots, TimeStatistics
 from hil_sim.nodes.turns import LockStep, OnClock, PacedLockStep
 from hil_sim.plant.sensors import Readings
 
@@ -93,12 +93,14 @@ def plant_run(database, oversleep_s, latency_s, make_turn=OnClock, periods=None)
     return turn.watch.timing(commanded), bus.sent
 
 
-def assert_spread(spread, times_s):
+def assert_statistics(statistics_of_times, times_s):
     ranked = sorted(1000.0 * time_s for time_s in times_s)
-    assert spread.median_ms == pytest.approx(statistics.median(ranked))
-    assert spread.p99_ms == pytest.approx(ranked[math.ceil(Fraction(99, 100) * len(ranked)) - 1])
-    assert spread.max_ms == ranked[-1]
-    assert spread.jitter_ms == pytest.approx(statistics.pstdev(ranked))
+    assert statistics_of_times.median_ms == pytest.approx(statistics.median(ranked))
+    assert statistics_of_times.p99_ms == pytest.approx(
+        ranked[math.ceil(Fraction(99, 100) * len(ranked)) - 1]
+    )
+    assert statistics_of_times.max_ms == ranked[-1]
+    assert statistics_of_times.jitter_ms == pytest.approx(statistics.pstdev(ranked))
 
 
 BELOW_A_PERIOD = st.integers(0, 99).map(lambda n: n / 128)
@@ -106,11 +108,11 @@ BELOW_A_PERIOD = st.integers(0, 99).map(lambda n: n / 128)
 
 @given(st.lists(BELOW_A_PERIOD, min_size=1, max_size=250))
 def test_a_spread_is_that_of_the_statistics_module(times_s):
-    assert_spread(Spread.of(times_s), times_s)
+    assert_statistics(TimeStatistics.of(times_s), times_s)
 
 
 def test_of_no_times_there_is_no_spread():
-    assert Spread.of([]) is None
+    assert TimeStatistics.of([]) is None
 
 
 @pytest.mark.parametrize("make_turn", [OnClock, lambda T, c: PacedLockStep(T, 0.25, None, c)])
@@ -118,8 +120,8 @@ def test_known_jitter_and_latency_come_out_as_they_went_in(database, make_turn):
     late_s = [n * 37 % 61 / 128 for n in range(200)]
     latency_s = [(20 + n * 11 % 7) / 128 for n in range(201)]
     timing, sent = plant_run(database, late_s, latency_s, make_turn)
-    assert_spread(timing.lateness, [0.0, *late_s])
-    assert_spread(timing.answer_latency, latency_s)
+    assert_statistics(timing.lateness, [0.0, *late_s])
+    assert_statistics(timing.answer_latency, latency_s)
     assert (timing.periods, timing.missed_deadlines) == (201, 0)
     assert timing.periods_without_command == timing.longest_without_command_periods == 0
     assert (timing.period_ms, timing.deadline_ms) == (1000.0, 500.0)

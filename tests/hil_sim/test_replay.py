@@ -9,7 +9,7 @@ from bms.errors import InputError
 from bms.firmware import Ecu
 from bms.model.model_file import load_model, shipped_model_path
 from bms.presets import load_preset, preset_path
-from hil_sim.bus.database import load_database
+from hil_sim.bus.database import load_codecs
 from hil_sim.logs import LogFrame, LogWriter, read_log
 from hil_sim.logs.recorder import Recorder
 from hil_sim.replay.comparison import compare
@@ -254,7 +254,7 @@ def test_every_byte_of_an_answer_counts(change, said):
     recording = load_recording(START)
     other = list(recording.answers)
     other[7] = change(other[7])
-    comparison = compare(recording, Signals(load_database()), recording.answers, other)
+    comparison = compare(recording, Signals(load_codecs()), recording.answers, other)
     assert (comparison.differing_periods, comparison.first.period) == (1, 7)
     assert said in comparison.first.signals
 
@@ -265,7 +265,7 @@ def test_answers_that_are_missing_are_not_taken_for_equal(kept):
     few = recording.answers[:kept]
     for one, other in ((recording.answers, few), (few, recording.answers), (few, few)):
         with pytest.raises(ValueError, match="shorter"):
-            compare(recording, Signals(load_database()), one, other)
+            compare(recording, Signals(load_codecs()), one, other)
 
 
 # --- The replayed log ----------------------------------------------------------------------------

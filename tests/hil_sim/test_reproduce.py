@@ -14,7 +14,7 @@ from bms.studies.paper_fit.figures import FIGURES
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.result import RunResult
 from hil_sim.run.session import ControllerKind
-from hil_sim.studies.reproduction.comparison import compare
+from hil_sim.studies.reproduction.comparison import compare_with_paper
 from hil_sim.studies.reproduction.files import content_json, runs_csv
 from hil_sim.studies.reproduction.margins import MARGINS, OURS_TOGETHER
 from hil_sim.studies.reproduction.runs import Case, all_cases, run_case
@@ -60,11 +60,11 @@ def changed(results, case, **figures):
 
 
 def line_of(results, name):
-    return next(line for line in compare(PRESET, results) if line.name == name)
+    return next(line for line in compare_with_paper(PRESET, results) if line.name == name)
 
 
 def test_every_figure_of_the_paper_is_compared(as_in_the_paper):
-    lines = compare(PRESET, as_in_the_paper)
+    lines = compare_with_paper(PRESET, as_in_the_paper)
     assert [line.name for line in lines[: len(FIGURES)]] == list(PAPER)
     assert all(line.difference == 0.0 and line.within for line in lines[: len(FIGURES)])
     ratio = line_of(as_in_the_paper, "KAN-rCBF / S-CBF time")

@@ -22,7 +22,7 @@ from bms.model.pair import load_pair
 from hil_sim.bus.buses import Frame, open_bus
 from hil_sim.fault_matrix.runner import MatrixSettings
 from hil_sim.replay.engine import replay
-from hil_sim.targets.agreement import compare_targets
+from hil_sim.targets.agreement import agreements_with_host
 from hil_sim.targets.catalog import NAMES, LinuxTarget, QemuTarget
 from hil_sim.targets.remote import RemoteEcu
 from hil_sim.targets.scenarios import (
@@ -102,7 +102,7 @@ def places(charge_and_faults, golden):
         work.append((board(HARD_FLOAT), [*faults, *golden.values()]))
         work.append((board(SOFT_FLOAT), [golden["sensor_fault"], *other]))
     # One after the other: there are as many workers of the tests as cores.
-    return {target.name: compare_targets([target], played)[0] for target, played in work}
+    return {target.name: agreements_with_host([target], played)[0] for target, played in work}
 
 
 def differing(agreements):
@@ -125,7 +125,7 @@ def test_a_native_process_with_another_model_says_the_same(golden, tmp_path, bms
     assert bms("export", "--model", model, "--out", tmp_path / "export")[0] == 0
     folder = build_variant("linux", tmp_path, f"GENERATED={tmp_path / 'export'}")
     target = LinuxTarget("linux", folder / "bms_ecu")
-    (agreements,) = compare_targets([target], [golden["lagged_model"]])
+    (agreements,) = agreements_with_host([target], [golden["lagged_model"]])
     assert differing(agreements) == {}
 
 
@@ -190,7 +190,7 @@ def test_a_constant_that_is_one_bit_off_is_found(tmp_path):
     assert before in text, "the mutant no longer applies; bring it up to date"
     source.write_text(text.replace(before, after))
     folder = build_variant(HARD_FLOAT, tmp_path / "build", tree=tmp_path)
-    ((agreement,),) = compare_targets([board(HARD_FLOAT, folder)], load_scenarios([HOT]))
+    ((agreement,),) = agreements_with_host([board(HARD_FLOAT, folder)], load_scenarios([HOT]))
     assert "StateOfCharge" in agreement.comparison.first.signals
 
 
@@ -224,7 +224,7 @@ def flip(position, bit):
 @pytest.mark.parametrize("bit", range(8))
 @pytest.mark.parametrize("position", range(8))
 def test_every_bit_counts(golden_start, position, bit):
-    ((agreement,),) = compare_targets([Altered(flip(position, bit))], golden_start)
+    ((agreement,),) = agreements_with_host([Altered(flip(position, bit))], golden_start)
     (frame,) = agreement.frames
     assert agreement.comparison.first.period == 100
     assert agreement.comparison.differing_periods == 1
@@ -245,7 +245,7 @@ def test_every_bit_counts(golden_start, position, bit):
     ids=["missing", "additional", "twice", "other order", "silence"],
 )
 def test_missing_additional_and_reordered_frames_are_differences(golden_start, change, named):
-    ((agreement,),) = compare_targets([Altered(change)], golden_start)
+    ((agreement,),) = agreements_with_host([Altered(change)], golden_start)
     assert agreement.comparison.differing_periods == 1
     assert agreement.comparison.first.signals
     assert named <= {frame.message for frame in agreement.frames}
@@ -276,7 +276,7 @@ class Shortened:
 )
 def test_a_target_that_leaves_runs_or_periods_out_is_an_error(golden_start, target, said):
     with pytest.raises(BusError, match=said):
-        compare_targets([target], golden_start)
+        agreements_with_host([target], golden_start)
 
 
 @pytest.mark.parametrize(
@@ -304,7 +304,7 @@ def test_a_place_that_is_not_there_is_told_before_anything_is_recorded(
 
 
 def test_equal_answers_are_no_difference(golden_start):
-    ((agreement,),) = compare_targets([Altered(lambda answer: answer)], golden_start)
+    ((agreement,),) = agreements_with_host([Altered(lambda answer: answer)], golden_start)
     assert agreement.comparison.is_equal
     assert agreement.frames == ()
 
@@ -332,7 +332,7 @@ def test_a_target_that_falls_silent_is_an_error_that_names_the_bus(monkeypatch, 
 @needs_vcan
 def test_a_program_that_is_no_ecu_is_an_error_in_one_line(golden_start):
     with pytest.raises(BusError, match=r"target 'linux': .*/false: does not say") as caught:
-        compare_targets([LinuxTarget("linux", Path("/bin/false"))], golden_start)
+        agreements_with_host([LinuxTarget("linux", Path("/bin/false"))], golden_start)
     assert "\n" not in str(caught.value)
 
 

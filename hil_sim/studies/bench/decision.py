@@ -49,7 +49,7 @@ def decision_in_c(problem: Problem) -> Peer:
 
 def decision_from_python(problem: Problem) -> Peer:
     """The same, every decision a call of bms.firmware.Firmware."""
-    rows = problem.spread(SOME)
+    rows = problem.sample(SOME)
     calls = _calls(problem, rows)
     decide: Any = problem.firmware.solve
 
@@ -70,7 +70,7 @@ def _calls(problem: Problem, rows: Rows) -> list[dict[str, float]]:
 def slsqp_decision(problem: Problem) -> Peer:
     """SciPy's SLSQP on the quadratics, with derivatives, from half the reference."""
     reference_A = problem.reference_current_A
-    few = problem.spread(FEW)
+    few = problem.sample(FEW)
     quadratics = problem.quadratics[few]
     programs = list(quadratics / np.abs(quadratics[:, :, 1:]).sum(axis=2, keepdims=True))
 
@@ -100,7 +100,7 @@ def osqp_decisions(problem: Problem) -> list[Peer]:
     """OSQP set up anew for every state, and updated from state to state; ImportError without it."""
     from osqp import OSQP  # noqa: PLC0415 (an optional extra)
 
-    few, one = problem.spread(FEW), csc_matrix([[1.0]])
+    few, one = problem.sample(FEW), csc_matrix([[1.0]])
     linear = np.array([-problem.reference_current_A])
     bounds = [
         (np.array([low]), np.array([high]))

@@ -44,7 +44,7 @@ def estimate_in_c(problem: Problem) -> Peer:
 
 def estimate_from_python(problem: Problem) -> Peer:
     """The same, every estimate a call of bms.firmware.Firmware."""
-    rows = problem.spread(SOME)
+    rows = problem.sample(SOME)
     calls = [dict(zip(INPUT_NAMES, row)) for row in problem.inputs[rows].tolist()]
     estimate: Any = problem.firmware.estimate
 
@@ -68,7 +68,7 @@ def scipy_estimates(problem: Problem) -> list[Peer]:
         return network.output_center_K + network.output_half_range_K * nodes[0]
 
     columns = normalised(problem).T
-    few = problem.spread(FEW)
+    few = problem.sample(FEW)
     rows = [tuple(row) for row in columns.T[few]]
     return [
         Peer(

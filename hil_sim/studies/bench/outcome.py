@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from hil_sim.studies.bench.aims import aims
-from hil_sim.studies.bench.race import Absent, Spread, Timed
+from hil_sim.studies.bench.race import Absent, Quartiles, Timed
 from hil_sim.studies.bench.run import Result
 from hil_sim.studies.bench.simulation import BusSpeed
 from hil_sim.studies.bench.throughput import growth
@@ -43,7 +43,7 @@ def _way(row: Timed, unit: str) -> dict[str, Any]:
     return {
         "name": row.name,
         "package": row.package,
-        **_spread(row.time_ns, "time", "ns"),
+        **_quartiles(row.time_ns, "time", "ns"),
         "answers_a_repetition": row.answers,
         f"largest_difference_{unit}": row.largest_difference,
     }
@@ -56,16 +56,16 @@ def _bus(speed: BusSpeed) -> dict[str, Any]:
         "bus": speed.bus,
         "parties": speed.parties,
         "periods": speed.periods,
-        **_spread(speed.times_real_time, "speed", "times_real_time"),
+        **_quartiles(speed.times_real_time, "speed", "times_real_time"),
         "processor_share_percent": speed.processor_share_percent,
         "layer_shares_percent": speed.layer_shares_percent,
     }
 
 
-def _spread(spread: Spread, name: str, unit: str) -> dict[str, Any]:
+def _quartiles(quartiles: Quartiles, name: str, unit: str) -> dict[str, Any]:
     return {
-        f"median_{name}_{unit}": spread.median,
-        f"lower_quartile_{name}_{unit}": spread.low,
-        f"upper_quartile_{name}_{unit}": spread.high,
-        "repetitions": spread.repetitions,
+        f"median_{name}_{unit}": quartiles.median,
+        f"lower_quartile_{name}_{unit}": quartiles.low,
+        f"upper_quartile_{name}_{unit}": quartiles.high,
+        "repetitions": quartiles.repetitions,
     }

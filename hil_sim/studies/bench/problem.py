@@ -47,7 +47,7 @@ class Problem:
     """What the ECU is sent in each period of the charge, in order of time."""
     series: TimeSeries
 
-    def spread(self, count: int) -> Rows:
+    def sample(self, count: int) -> Rows:
         """So many of the rows, from all over the charge."""
         return np.linspace(0, len(self.lower_A) - 1, count).astype(np.int64)
 

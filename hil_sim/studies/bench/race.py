@@ -56,7 +56,7 @@ class Absent:
 
 
 @dataclass(frozen=True)
-class Spread:
+class Quartiles:
     """Median and quartiles of repeated measurements, and their number."""
 
     median: float
@@ -65,7 +65,7 @@ class Spread:
     repetitions: int
 
     @classmethod
-    def of(cls, values: Sequence[float]) -> Spread:
+    def of(cls, values: Sequence[float]) -> Quartiles:
         """Of at least one value."""
         low, high = np.quantile(values, (0.25, 0.75)).tolist()
         return cls(median(values), low, high, len(values))
@@ -77,7 +77,7 @@ class Timed:
 
     name: str
     package: str
-    time_ns: Spread
+    time_ns: Quartiles
     answers: int
     largest_difference: float
     """From the reference, in the unit of the answers."""
@@ -112,4 +112,6 @@ def _timed(reference: Array, peer: Peer, repetitions: int, clock_ns: ClockNs) ->
         begin_ns = clock_ns()
         peer.solve()
         runs.append((clock_ns() - begin_ns) / len(answers))
-    return Timed(peer.name, peer.package, Spread.of(runs), len(answers), float(difference[worst]))
+    return Timed(
+        peer.name, peer.package, Quartiles.of(runs), len(answers), float(difference[worst])
+    )

@@ -18,7 +18,7 @@ from bms.presets import load_preset
 from hil_sim.logs.recorder import Recorder
 from hil_sim.run.session import Settings, run_both, run_plant
 from hil_sim.studies.bench.layers import sampled
-from hil_sim.studies.bench.race import Clocks, Spread
+from hil_sim.studies.bench.race import Clocks, Quartiles
 from hil_sim.targets.linux import GUEST
 
 BUSES = ("virtual:bench", "udp_multicast:239.74.163.71", "socketcan:vcan0")
@@ -36,7 +36,7 @@ class BusSpeed:
     bus: str
     parties: str
     periods: int
-    times_real_time: Spread | None
+    times_real_time: Quartiles | None
     processor_share_percent: float
     """Of one core, that the plant's process had; all of it is a run that nobody else disturbed."""
     layer_shares_percent: dict[str, float]
@@ -96,7 +96,9 @@ def bus_speed(
             _charge(settings, preset, is_virtual, _Pace(clocks, layers.forget))
     except BusError as error:
         return BusSpeed(bus, parties, 0, None, 0.0, {}, str(error))
-    return BusSpeed(bus, parties, periods, Spread.of(speeds), median(shares), layers.shares_percent)
+    return BusSpeed(
+        bus, parties, periods, Quartiles.of(speeds), median(shares), layers.shares_percent
+    )
 
 
 def _charge(settings: Settings, preset: str, is_virtual: bool, pace: _Pace) -> None:
@@ -149,5 +151,5 @@ def _in_guest(bus: str, preset: str, max_time_s: float, repetitions: int) -> Bus
         return BusSpeed(bus, parties, 0, None, 0.0, {}, reason)
     content = json.loads(done.stdout)
     speed = content["times_real_time"]
-    content["times_real_time"] = None if speed is None else Spread(**speed)
+    content["times_real_time"] = None if speed is None else Quartiles(**speed)
     return BusSpeed(**{**content, "parties": parties})

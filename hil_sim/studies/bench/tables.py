@@ -62,12 +62,12 @@ def _ways(title: str, rows: list[Timed | Absent], c_ns: float | None) -> Table:
     table = _table(title, "", "median", "quartiles", "times C")
     for row in rows:
         if isinstance(row, Timed):
-            spread = row.time_ns
+            quartiles = row.time_ns
             table.add_row(
                 escape(row.name),
-                _time(spread.median),
-                f"{_time(spread.low)} .. {_time(spread.high)}",
-                "" if c_ns is None else _ratio(spread.median / c_ns),
+                _time(quartiles.median),
+                f"{_time(quartiles.low)} .. {_time(quartiles.high)}",
+                "" if c_ns is None else _ratio(quartiles.median / c_ns),
             )
     return table
 
@@ -103,14 +103,14 @@ def _simulation(result: Result) -> Table:
     title = "Simulation of a charge in lock step, with protection and recording"
     table = _table(title, "bus", "x real time", "quartiles", "processor", "periods", "parties")
     for speed in result.simulation:
-        spread = speed.times_real_time
-        if spread is not None:
+        quartiles = speed.times_real_time
+        if quartiles is not None:
             table.add_row(
                 speed.bus,
-                f"{spread.median:.0f}",
-                f"{spread.low:.0f} .. {spread.high:.0f}",
+                f"{quartiles.median:.0f}",
+                f"{quartiles.low:.0f} .. {quartiles.high:.0f}",
                 f"{speed.processor_share_percent:.0f} %",
-                f"{spread.repetitions} x {speed.periods}",
+                f"{quartiles.repetitions} x {speed.periods}",
                 speed.parties,
             )
     return table

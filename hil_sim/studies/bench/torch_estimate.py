@@ -39,7 +39,7 @@ def pykan_estimates(problem: Problem) -> list[Peer]:
 
     rows = torch.tensor(normalised(problem), dtype=torch.float32)
     return _one_by_one_and_all(
-        "KAN in pykan", package("pykan"), evaluate, rows, TOLERANCE_K, problem.spread(FEW)
+        "KAN in pykan", package("pykan"), evaluate, rows, TOLERANCE_K, problem.sample(FEW)
     )
 
 
@@ -75,7 +75,7 @@ def torch_perceptron(problem: Problem) -> TorchPerceptron:
         lambda rows: model(rows).numpy()[:, 0].astype(np.float64),
         torch.tensor(x, dtype=torch.float32),
         1e-4,
-        problem.spread(FEW),
+        problem.sample(FEW),
     )
     return TorchPerceptron(peers, perceptron.values(x))
 

@@ -16,16 +16,16 @@ from bms.presets import Preset
 from hil_sim.plant.disturbances import DisturbanceKind
 
 
-class Spread(NamedTuple):
+class RelativeInterval(NamedTuple):
     """Interval of a parameter relative to its nominal value."""
 
     low: float
     high: float
 
 
-CORE_RESISTANCE = Spread(1.86 / 1.94, 2.01 / 1.94)
-CORE_HEAT_CAPACITY = Spread(59.1 / 62.7, 66.4 / 62.7)
-SURFACE_RESISTANCE = Spread(3.19 / 3.19, 3.20 / 3.19)
+CORE_RESISTANCE = RelativeInterval(1.86 / 1.94, 2.01 / 1.94)
+CORE_HEAT_CAPACITY = RelativeInterval(59.1 / 62.7, 66.4 / 62.7)
+SURFACE_RESISTANCE = RelativeInterval(3.19 / 3.19, 3.20 / 3.19)
 """Confidence intervals of Lin et al. 2014, J. Power Sources 257, Table 1, over its estimates."""
 
 PLUG_IN_SOC = (0.0, 0.5)
@@ -64,8 +64,8 @@ class Draw:
 def draw(preset: Preset, run: int, rng: np.random.Generator) -> Draw:
     """Draw of a run; every quantity is uniform in its interval. Families alternate."""
     family = Family.WITHIN if run % 2 == 0 else Family.PUBLISHED
-    spreads = (CORE_RESISTANCE, CORE_HEAT_CAPACITY, SURFACE_RESISTANCE)
-    factors = np.array([rng.uniform(*spread) for spread in spreads])
+    intervals = (CORE_RESISTANCE, CORE_HEAT_CAPACITY, SURFACE_RESISTANCE)
+    factors = np.array([rng.uniform(*interval) for interval in intervals])
     box = preset.operating_box
     soc = rng.uniform(*PLUG_IN_SOC)
     temperature_K = rng.uniform(

@@ -91,8 +91,8 @@ def _figures(
             limit: _probability(int(hits.sum()), runs) for limit, hits in crossed.items()
         },
         "outcomes": dict(sorted(outcomes.items())),
-        "peaks": {peak: _spread(column(rows, of)[mask]) for peak, of in peaks.items()},
-        "charge_time_s": _spread(column(rows, f"{name}_charge_time_s")[mask]),
+        "peaks": {peak: _quantiles(column(rows, of)[mask]) for peak, of in peaks.items()},
+        "charge_time_s": _quantiles(column(rows, f"{name}_charge_time_s")[mask]),
     }
 
 
@@ -109,7 +109,7 @@ def _probability(count: int, runs: int) -> dict[str, float | int | None]:
     }
 
 
-def _spread(values: Array) -> dict[str, float] | None:
+def _quantiles(values: Array) -> dict[str, float] | None:
     known = values[~np.isnan(values)]
     if known.size == 0:
         return None

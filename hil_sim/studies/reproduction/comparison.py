@@ -29,7 +29,7 @@ _SAME_CELL_SHARE = 0.01
 
 
 @dataclass(frozen=True)
-class Line:
+class PaperComparison:
     """A figure of the paper and ours under each disturbance; None for what did not happen.
 
     The difference is that without disturbance; a tolerance of None means that there is no target.
@@ -55,9 +55,9 @@ class Line:
         return self.difference is not None and abs(self.difference) <= self.tolerance
 
 
-def compare(preset: Preset, results: Results) -> list[Line]:
+def compare_with_paper(preset: Preset, results: Results) -> list[PaperComparison]:
     """The paper's seven figures, the ratio of charging times, and the error of the estimate."""
-    lines = []
+    rows = []
     for figure in FIGURES:
         label, _, quantity = figure.name.partition(" ")
         controller, key = _CONTROLLERS[label], _KEYS[quantity]
@@ -65,8 +65,10 @@ def compare(preset: Preset, results: Results) -> list[Line]:
             _value(results, Case(preset.name, controller, noise), key) for noise in DISTURBANCES
         )
         cause = _cause(preset, results, controller, key, figure.paper)
-        lines.append(Line(figure.name, figure.unit, figure.paper, ours, figure.tolerance, cause))
-    return [*lines, _ratio(preset, results), *_estimate_lines(preset, results)]
+        rows.append(
+            PaperComparison(figure.name, figure.unit, figure.paper, ours, figure.tolerance, cause)
+        )
+    return [*rows, _ratio(preset, results), *_estimate_rows(preset, results)]
 
 
 def _time_ratio(preset: Preset, results: Results, disturbance: DisturbanceKind) -> float | None:
@@ -78,14 +80,16 @@ def _time_ratio(preset: Preset, results: Results, disturbance: DisturbanceKind) 
     return None if robust_s is None or surface_s is None else robust_s / surface_s
 
 
-def _ratio(preset: Preset, results: Results) -> Line:
+def _ratio(preset: Preset, results: Results) -> PaperComparison:
     times_s = {figure.name: figure.paper for figure in FIGURES}
     paper = times_s["KAN-rCBF time to full"] / times_s["S-CBF time to full"]
     ours = tuple(_time_ratio(preset, results, noise) for noise in DISTURBANCES)
-    return Line("KAN-rCBF / S-CBF time", "", paper, ours, None, "follows from both times")
+    return PaperComparison(
+        "KAN-rCBF / S-CBF time", "", paper, ours, None, "follows from both times"
+    )
 
 
-def _estimate_lines(preset: Preset, results: Results) -> list[Line]:
+def _estimate_rows(preset: Preset, results: Results) -> list[PaperComparison]:
     in_charge = tuple(
         _value(results, Case(preset.name, disturbance=noise), "kan_rmse_K")
         for noise in DISTURBANCES
@@ -94,7 +98,7 @@ def _estimate_lines(preset: Preset, results: Results) -> list[Line]:
     held_out_K = model.errors["test"].overall.rmse_K
     profiles = model.training.profiles["test"]
     return [
-        Line(
+        PaperComparison(
             "KAN RMSE, this charge",
             "K",
             PAPER_KAN_RMSE_K,
@@ -102,7 +106,7 @@ def _estimate_lines(preset: Preset, results: Results) -> list[Line]:
             None,
             "cell, start and cooling of the paper's charge are not published",
         ),
-        Line(
+        PaperComparison(
             "KAN RMSE, held out",
             "K",
             PAPER_KAN_RMSE_K,

@@ -14,7 +14,7 @@ from hil_sim.report.folder import OutputFolder
 from hil_sim.report.page import data_url, render_page
 from hil_sim.run.result import Summary
 from hil_sim.run.session import ControllerKind
-from hil_sim.studies.reproduction.comparison import compare
+from hil_sim.studies.reproduction.comparison import compare_with_paper
 from hil_sim.studies.reproduction.runs import DISTURBANCES, Case, Results
 from hil_sim.studies.reproduction.sections import BAD, passed, sections
 
@@ -59,16 +59,16 @@ def content_json(presets: Sequence[Preset], results: Results, seed: int) -> dict
             preset.name: {
                 "comparison": [
                     {
-                        "figure": line.name,
-                        "unit": line.unit,
-                        "paper": line.paper,
-                        "ours": list(line.ours),
-                        "difference": line.difference,
-                        "tolerance": line.tolerance,
-                        "within": line.within,
-                        "likely_cause": line.cause,
+                        "figure": row.name,
+                        "unit": row.unit,
+                        "paper": row.paper,
+                        "ours": list(row.ours),
+                        "difference": row.difference,
+                        "tolerance": row.tolerance,
+                        "within": row.within,
+                        "likely_cause": row.cause,
                     }
-                    for line in compare(preset, results)
+                    for row in compare_with_paper(preset, results)
                 ],
                 "notes": [note for section in sections(preset, results) for note in section.notes],
                 "runs": [row for row in _rows(results) if row["preset"] == preset.name],

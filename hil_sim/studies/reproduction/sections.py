@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from bms.presets import Preset
 from hil_sim.run.result import Summary
 from hil_sim.run.session import ControllerKind
-from hil_sim.studies.reproduction.comparison import Line, compare
+from hil_sim.studies.reproduction.comparison import PaperComparison, compare_with_paper
 from hil_sim.studies.reproduction.margins import EVERYTHING, MARGINS, OURS_TOGETHER
 from hil_sim.studies.reproduction.runs import DISTURBANCES, Case, Results
 
@@ -40,35 +40,35 @@ def _number(value: float | None, unit: str, sign: str = "") -> str:
 
 
 def _paper_section(preset: Preset, results: Results) -> Section:
-    lines = compare(preset, results)
+    rows = compare_with_paper(preset, results)
     return Section(
         f"{preset.name}: the paper's figures beside ours",
         ("", "paper", *(noise.value for noise in DISTURBANCES), "none – paper", "target ±"),
-        tuple(_paper_row(line) for line in lines),
+        tuple(_paper_row(row) for row in rows),
         tuple(
-            f"{line.name}: {_line_number(line, line.difference, '+')} {line.unit}".rstrip()
-            + f"; likely cause: {line.cause}."
-            for line in lines
-            if line.difference is not None
+            f"{row.name}: {_row_number(row, row.difference, '+')} {row.unit}".rstrip()
+            + f"; likely cause: {row.cause}."
+            for row in rows
+            if row.difference is not None
         ),
     )
 
 
-def _line_number(line: Line, value: float | None, sign: str = "") -> str:
-    is_error = line.unit == "K" and line.paper < _LARGEST_ERROR_K
-    return _number(value, "error" if is_error else line.unit, sign)
+def _row_number(row: PaperComparison, value: float | None, sign: str = "") -> str:
+    is_error = row.unit == "K" and row.paper < _LARGEST_ERROR_K
+    return _number(value, "error" if is_error else row.unit, sign)
 
 
 _LARGEST_ERROR_K = 1.0
 
 
-def _paper_row(line: Line) -> tuple[str, ...]:
-    ours = [_line_number(line, value) for value in line.ours]
+def _paper_row(row: PaperComparison) -> tuple[str, ...]:
+    ours = [_row_number(row, value) for value in row.ours]
     ours += [""] * (len(DISTURBANCES) - len(ours))
-    target = "" if line.tolerance is None else _line_number(line, line.tolerance)
-    difference = _line_number(line, line.difference, "+") + (BAD if line.within is False else "")
-    name = f"{line.name}, {line.unit}" if line.unit else line.name
-    return (name, _line_number(line, line.paper), *ours, difference, target)
+    target = "" if row.tolerance is None else _row_number(row, row.tolerance)
+    difference = _row_number(row, row.difference, "+") + (BAD if row.within is False else "")
+    name = f"{row.name}, {row.unit}" if row.unit else row.name
+    return (name, _row_number(row, row.paper), *ours, difference, target)
 
 
 def _controller_section(preset: Preset, results: Results) -> Section:

@@ -20,7 +20,7 @@ from bms.firmware import Ecu
 from bms.model.model_file import shipped_model_path
 from bms.presets import load_preset
 from hil_sim.bus.buses import open_bus
-from hil_sim.bus.database import load_database
+from hil_sim.bus.database import load_codecs
 from hil_sim.faults import Injection, parse_fault
 from hil_sim.logs.recorder import Recorder
 from hil_sim.nodes.ecu import EcuNode
@@ -135,7 +135,7 @@ def record(name: str, path: Path) -> None:
         ),
     )
     model = shipped_model_path(shipped.name, lagged=True) if scenario.lagged else None
-    database, period_s = load_database(), preset.timing.sampling_period_s
+    database, period_s = load_codecs(), preset.timing.sampling_period_s
     seeds = np.random.SeedSequence(SEED).spawn(3)
     rng = np.random.default_rng(seeds[0])
     plant = Plant(
