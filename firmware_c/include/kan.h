@@ -10,44 +10,45 @@
 #include <stdint.h>
 
 #define KAN_MAX_LAYERS 3
-#define KAN_MAX_WIDTH 8
+#define KAN_MAX_WIDTH 8 /* nodes of a layer, inputs too */
 #define KAN_MAX_KNOTS 128
 #define KAN_MAX_COEFFICIENTS 512
 #define KAN_CELL_COEFFICIENTS 8
-#define KAN_MEASURED_INPUTS 4
+#define KAN_MEASURED_INPUTS 4 /* the first inputs; lagged ones follow */
 #define KAN_MAX_LAGS 4
 #define KAN_MAX_DIRECTIONS 8
 
-/* Edges are stored layer by layer, output by output, input by input; an edge has cells + 1 knots
- * and cells * KAN_CELL_COEFFICIENTS coefficients, constant term first. */
+/* What a lagged input remembers. */
 typedef enum { KAN_CURRENT_SQUARED = 0, KAN_SURFACE_TEMPERATURE_RISE = 1 } kan_quantity_t;
 
 /* A lagged input: y <- decay y + gain times the current squared, or the surface temperature's
  * change, of one period. */
 typedef struct {
-    uint32_t quantity;
+    uint32_t quantity; /* kan_quantity_t */
     float decay;
     float gain;
 } kan_lag_t;
 
 /* Training data lie at low <= component . normalised inputs <= high. */
 typedef struct {
-    float component[8];
+    float component[KAN_MAX_WIDTH];
     float low;
     float high;
 } kan_direction_t;
 
+/* Edges are stored layer by layer, output by output, input by input; an edge has cells + 1 knots
+ * and cells * KAN_CELL_COEFFICIENTS coefficients, constant term first. */
 typedef struct {
     uint32_t layers;
-    uint32_t cells;
-    uint32_t width[4];
-    uint32_t lags; /* the last inputs */
+    uint32_t cells;                     /* of every edge */
+    uint32_t width[KAN_MAX_LAYERS + 1]; /* nodes: inputs first, the one output last */
+    uint32_t lags;                      /* how many of the inputs, the last ones, are lagged */
     uint32_t settling_periods;
     uint32_t directions;
-    kan_lag_t lag[4];
-    kan_direction_t direction[8];
-    float input_center[8];
-    float input_scale[8];
+    kan_lag_t lag[KAN_MAX_LAGS];
+    kan_direction_t direction[KAN_MAX_DIRECTIONS];
+    float input_center[KAN_MAX_WIDTH];
+    float input_scale[KAN_MAX_WIDTH];
     float input_reach; /* normalised inputs act up to this; beyond 1 they are flagged */
     float output_center_K;
     float output_half_range_K;
