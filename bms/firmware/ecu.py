@@ -12,7 +12,7 @@ from bms.model.model_file import KanModel
 from bms.model.pair import load_pair
 from bms.presets import Preset
 
-MAX_DATA_LENGTH = 8
+_FRAME_BYTES = len(ffi.new("can_frame_t *").data)
 
 
 class Ecu:
@@ -43,8 +43,8 @@ class Ecu:
     def receive(self, frame_id: int, data: bytes) -> None:
         """Take any frame with an 11-bit or 29-bit identifier and up to 8 data bytes."""
         frame = self._frame
-        frame.id, frame.length = frame_id, min(len(data), MAX_DATA_LENGTH + 1)
-        ffi.memmove(frame.data, data, min(len(data), MAX_DATA_LENGTH))
+        frame.id, frame.length = frame_id, min(len(data), _FRAME_BYTES + 1)
+        ffi.memmove(frame.data, data, min(len(data), _FRAME_BYTES))
         lib.bms_receive(self._state, frame)
 
     def step(self) -> None:

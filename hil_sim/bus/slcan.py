@@ -16,6 +16,8 @@ from typing import Any
 
 import can
 
+from hil_sim.bus.limits import HIGHEST_EXTENDED_ID, HIGHEST_STANDARD_ID
+
 SCHEME = "socket://"
 _SETTINGS = b"C\rS6\r"
 """Closed, so that it may be set; 500 kbit/s."""
@@ -24,7 +26,7 @@ _CHUNK_BYTES = 1 << 16
 _LONGEST_LINE = 64
 _MOST_WAITING_BYTES = 1 << 14
 _REFUSED = b"\a"
-_HIGHEST_ID = {False: 0x7FF, True: 0x1FFFFFFF}
+_HIGHEST_ID = {False: HIGHEST_STANDARD_ID, True: HIGHEST_EXTENDED_ID}
 """By whether the identifier is extended."""
 _FRAME = re.compile(
     rb"([trTR])((?<=[tr])[0-9A-Fa-f]{3}|(?<=[TR])[0-9A-Fa-f]{8})([0-8])((?:[0-9A-Fa-f]{2})*)"

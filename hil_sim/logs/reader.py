@@ -18,11 +18,9 @@ import can
 from can.io.player import MESSAGE_READERS
 
 from bms.errors import InputError
+from hil_sim.bus.limits import HIGHEST_EXTENDED_ID, HIGHEST_STANDARD_ID, MAX_DATA_LENGTH
 from hil_sim.logs.formats import LogFormat, is_compressed, usable_format
 from hil_sim.logs.frame import LogFrame
-
-MAX_DATA_LENGTH = 8
-HIGHEST_STANDARD_ID, HIGHEST_EXTENDED_ID = 0x7FF, 0x1FFFFFFF
 
 # What the libraries have to say about a file is in their exceptions already.
 for _library in ("can", "asammdf"):
