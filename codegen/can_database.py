@@ -15,7 +15,7 @@ ECU, PLANT = "ECU", "PLANT"
 
 
 def database_text() -> str:
-    """Text of bms.dbc."""
+    """Text of codegen/can/bms.dbc, as it is hashed and parsed."""
     return (files("codegen") / "can" / "bms.dbc").read_text(encoding="utf-8")
 
 
@@ -25,7 +25,7 @@ def database_digest() -> str:
 
 
 def load_database() -> Database:
-    """The parsed database."""
+    """The database as cantools parses it: messages, signals, attributes."""
     database = cantools.database.load_string(database_text(), database_format="dbc")
     assert isinstance(database, Database)
     return database

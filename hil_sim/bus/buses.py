@@ -69,7 +69,7 @@ class CanBus(Closing):
         return None
 
     def close(self) -> None:
-        """Leave the bus."""
+        """Close the connection to the bus."""
         self._bus.shutdown()
 
 

@@ -1,4 +1,4 @@
-"""What has to be closed at the end of a with block."""
+"""Base of what a with block closes at its end: buses, files, processes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Closing(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Give back what was opened."""
+        """Release what was opened."""
 
     def __enter__(self: _Self) -> _Self:
         return self

@@ -16,7 +16,7 @@ class Identity:
 
     @classmethod
     def of(cls, value: Callable[[str], float | None]) -> Identity | None:
-        """From the value of each signal by its name; None where the message has not come."""
+        """From a function that gives the value of a signal; None before the message has come."""
         model, preset, version = map(value, ("ModelHash", "PresetHash", "FirmwareVersion"))
         if model is None or preset is None or version is None:
             return None

@@ -27,7 +27,7 @@ class Run(Protocol):
     def __call__(
         self, settings: Settings, recorder: Recorder | None = None, progress: Any = ...
     ) -> RunResult:
-        """Run to the end."""
+        """Run a charge to its end; `progress` is told the state of charge of each period."""
         ...
 
 

@@ -71,7 +71,7 @@ class ReplayReport:
 
 
 def builds_json(builds: tuple[Path, Path], verdicts: Sequence[LogVerdict]) -> dict[str, Any]:
-    """Two builds on several logs."""
+    """Where two builds differ, by log."""
     return {
         "build_a": str(builds[0]),
         "build_b": str(builds[1]),
@@ -83,7 +83,7 @@ def builds_json(builds: tuple[Path, Path], verdicts: Sequence[LogVerdict]) -> di
 def print_builds(
     console: Console, builds: tuple[Path, Path], verdicts: Sequence[LogVerdict]
 ) -> None:
-    """A line for each log."""
+    """Print a row for each log, then the faults that one build alone raises."""
     _say(console, f"A: {builds[0]}")
     _say(console, f"B: {builds[1]}, differences are B less A")
     table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
@@ -121,7 +121,7 @@ def _values_json(values: Values, signals: Signals) -> dict[str, float | None]:
 def first_json(
     first: PeriodDifference, signals: Signals, sides: tuple[str, str] = ("log", "replay")
 ) -> dict[str, Any]:
-    """The same as JSON."""
+    """The first period that differs: what both sides got and what each said."""
     one, other = first.sides
     return {
         "period": first.period,

@@ -100,7 +100,7 @@ class _Matrix:
 
 @dataclass(frozen=True)
 class Row:
-    """One run of the matrix."""
+    """One run of the matrix: its fault, where it starts, and what the ECU has to do."""
 
     name: str
     fault: Fault

@@ -27,7 +27,7 @@ class MatrixResult:
 
     @property
     def sentence(self) -> str:
-        """The verdict on the whole."""
+        """In one sentence, whether all rows went as expected."""
         if self.red:
             return f"{len(self.red)} of {len(self.verdicts)} rows are red"
         return f"all {len(self.verdicts)} rows as expected, no limit of the plant crossed"
@@ -114,7 +114,7 @@ def matrix_junit(result: MatrixResult) -> str:
 
 
 def matrix_page(result: MatrixResult) -> str:
-    """The self-contained HTML page."""
+    """Self-contained HTML page with a row of the table for each verdict."""
     return render_page(
         "fault_matrix.html.j2",
         result=result,

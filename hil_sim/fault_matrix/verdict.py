@@ -30,7 +30,7 @@ class Verdict:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing is wrong."""
+        """Whether the run went as its row expects and no limit of the plant was crossed."""
         return not self.failures
 
 

@@ -60,7 +60,7 @@ class Fault(ABC):
 
     @property
     def is_for_good(self) -> bool:
-        """Whether it never ends."""
+        """Whether it lasts until the end of the run."""
         return self.for_s is None and self.for_periods is None
 
 

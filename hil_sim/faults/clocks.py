@@ -27,7 +27,7 @@ class ClockJitter(Fault):
 
     @property
     def where(self) -> str:
-        """The plant's clock."""
+        """The plant's clock, in words."""
         return "plant's clock"
 
     def wait(self, clock: Clock, rng: np.random.Generator) -> None:

@@ -1,4 +1,4 @@
-"""Faults of the ECU itself."""
+"""Faults inside the ECU: a restart that loses its state."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class EcuRestarted(Fault):
 
     @property
     def where(self) -> str:
-        """The ECU."""
+        """The ECU, in words."""
         return "ECU"
 
 
@@ -35,19 +35,19 @@ class RestartableEcu:
         self._ecu: EcuLike | None = make()
 
     def receive(self, frame_id: int, data: bytes) -> None:
-        """Take in a frame."""
+        """Pass a frame on to the ECU; one that is down does not hear it."""
         ecu = self._running()
         if ecu is not None:
             ecu.receive(frame_id, data)
 
     def step(self) -> None:
-        """Run one control period."""
+        """Let the ECU run one control period unless it is down."""
         ecu = self._running()
         if ecu is not None:
             ecu.step()
 
     def transmit(self) -> Sequence[tuple[int, bytes]]:
-        """Frames of this step in order."""
+        """Frames of this step in order; none from an ECU that is down."""
         ecu = self._running()
         return [] if ecu is None else ecu.transmit()
 

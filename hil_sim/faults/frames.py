@@ -18,10 +18,8 @@ from bms.validation import strict
 from hil_sim.bus.buses import Frame
 from hil_sim.bus.catalog import Message, ReceivedName, SentName
 from hil_sim.bus.database import COUNTER_MODULUS, MessageCodec, profile2_crc
+from hil_sim.bus.limits import HIGHEST_STANDARD_ID, MAX_DATA_LENGTH
 from hil_sim.faults.base import Fault
-
-MAX_DATA_LENGTH = 8
-HIGHEST_ID = 0x7FF
 
 MessageName = Literal[ReceivedName, SentName]
 
@@ -42,7 +40,7 @@ class FrameFault(Fault):
 
     @property
     def where(self) -> str:
-        """The whole bus."""
+        """The bus as a whole, unless a kind of fault names something narrower."""
         return "bus"
 
     def check(self, database: Mapping[str, MessageCodec]) -> None:
@@ -62,7 +60,7 @@ class MessageFault(FrameFault):
 
     @property
     def where(self) -> str:
-        """The message."""
+        """Name of the message whose frames are hit."""
         return self.message
 
     def apply(self, frames: list[Frame], active: bool, memory: FrameMemory) -> list[Frame]:
@@ -89,7 +87,7 @@ class MessageLost(MessageFault):
     kind: Literal["message-lost"]
 
     def change(self, frame: Frame, active: bool, memory: FrameMemory) -> list[Frame]:
-        """Nothing."""
+        """No frame while the fault acts."""
         return [] if active else [frame]
 
 
@@ -102,7 +100,7 @@ class MessageDelayed(MessageFault):
     delay_periods: Annotated[int, Ge(1), Le(1000)]
 
     def change(self, frame: Frame, active: bool, memory: FrameMemory) -> list[Frame]:
-        """What was sent delay_periods ago."""
+        """The frame of delay_periods ago; at the end all that still wait."""
         memory.kept.append(frame)
         waiting = self.delay_periods if active else 0
         arriving = memory.kept[: max(0, len(memory.kept) - waiting)]
@@ -119,7 +117,7 @@ class MessageRepeated(MessageFault):
     copies: Annotated[int, Ge(1), Le(100)] = 1
 
     def change(self, frame: Frame, active: bool, memory: FrameMemory) -> list[Frame]:
-        """The frame and its copies."""
+        """The frame and, while the fault acts, its copies after it."""
         return [frame] * (1 + self.copies) if active else [frame]
 
 
@@ -131,7 +129,7 @@ class MessageFrozen(MessageFault):
     kind: Literal["message-frozen"]
 
     def change(self, frame: Frame, active: bool, memory: FrameMemory) -> list[Frame]:
-        """The old frame."""
+        """The last frame from before the fault."""
         if not (active and memory.kept):
             memory.kept = [frame]
         return list(memory.kept)
@@ -145,7 +143,7 @@ class MessageReordered(MessageFault):
     kind: Literal["message-reordered"]
 
     def change(self, frame: Frame, active: bool, memory: FrameMemory) -> list[Frame]:
-        """Nothing, or the pair the wrong way round."""
+        """Nothing for the first of a pair, and the pair in reverse order for the second."""
         if memory.kept:
             return [frame, memory.kept.pop()]
         if not active:
@@ -165,11 +163,11 @@ class ByteCorrupted(MessageFault):
 
     @property
     def where(self) -> str:
-        """The message and the byte."""
+        """Name of the message and number of the byte."""
         return f"{self.message} byte {self.byte}"
 
     def check(self, database: Mapping[str, MessageCodec]) -> None:
-        """The message must have that byte."""
+        """Raise InputError when the message is too short to have that byte."""
         length = database[self.message].length
         if self.byte >= length:
             raise InputError(f"byte: {self.message} has {length} bytes; give 0 to {length - 1}")
@@ -189,10 +187,10 @@ class WrongId(MessageFault):
     """Frames carry another identifier, perhaps that of another message."""
 
     kind: Literal["message-wrong-id"]
-    frame_id: Annotated[int, Ge(0), Le(HIGHEST_ID)]
+    frame_id: Annotated[int, Ge(0), Le(HIGHEST_STANDARD_ID)]
 
     def check(self, database: Mapping[str, MessageCodec]) -> None:
-        """The identifier must be another one, and not SYNC, which is the clock."""
+        """Raise InputError for the own identifier, and for SYNC, which is the clock."""
         if self.frame_id in (database[self.message].frame_id, database[Message.SYNC].frame_id):
             raise InputError(
                 f"frame_id: {self.frame_id:#x} is the identifier of {self.message} or SYNC; "
@@ -213,7 +211,7 @@ class WrongLength(MessageFault):
     length: Annotated[int, Ge(0), Le(MAX_DATA_LENGTH)]
 
     def check(self, database: Mapping[str, MessageCodec]) -> None:
-        """The length must be another one."""
+        """Raise InputError when the length is the right one."""
         if self.length == database[self.message].length:
             raise InputError(f"length: {self.length} is right for {self.message}; give another one")
 
@@ -232,7 +230,7 @@ class Masquerade(MessageFault):
     kind: Literal["message-masqueraded"]
 
     def check(self, database: Mapping[str, MessageCodec]) -> None:
-        """The message must have a counter."""
+        """Raise InputError for a message without a counter."""
         if not database[self.message].data_ids:
             raise InputError(f"message: {self.message} is not protected; give one that is")
 
@@ -256,7 +254,7 @@ class BusOff(FrameFault):
     kind: Literal["bus-off"]
 
     def apply(self, frames: list[Frame], active: bool, memory: FrameMemory) -> list[Frame]:
-        """SYNC alone."""
+        """While the fault acts, SYNC and no other frame."""
         sync_id = memory.database[Message.SYNC].frame_id
         return [frame for frame in frames if not active or frame.frame_id == sync_id]
 
@@ -277,7 +275,7 @@ class Flood(FrameFault):
 
     @property
     def where(self) -> str:
-        """Where in the period."""
+        """The bus, and where in the period the foreign frames come."""
         return f"bus, {self.position} the messages"
 
     def apply(self, frames: list[Frame], active: bool, memory: FrameMemory) -> list[Frame]:
@@ -298,7 +296,7 @@ class Flood(FrameFault):
 
     def _foreign(self, memory: FrameMemory) -> list[Frame]:
         known = {codec.frame_id for codec in memory.database.values()}
-        free = [frame_id for frame_id in range(HIGHEST_ID + 1) if frame_id not in known]
+        free = [frame_id for frame_id in range(HIGHEST_STANDARD_ID + 1) if frame_id not in known]
         rng, count = memory.rng, self.frames_per_period
         ids = rng.integers(len(free), size=count).tolist()
         lengths = rng.integers(MAX_DATA_LENGTH + 1, size=count).tolist()

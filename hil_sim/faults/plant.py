@@ -15,7 +15,7 @@ class ChargerFault(Fault):
 
     @property
     def where(self) -> str:
-        """The charger."""
+        """The charger, in words."""
         return "charger"
 
     @abstractmethod
@@ -31,7 +31,7 @@ class ChargerStuck(ChargerFault):
     kind: Literal["charger-stuck"]
 
     def current_A(self, obedient_A: float, last_A: float) -> float:
-        """The last current."""
+        """The current of the last period, whatever the rule gives."""
         return last_A
 
 
@@ -44,7 +44,7 @@ class ChargerGain(ChargerFault):
     factor: NonNegative
 
     def current_A(self, obedient_A: float, last_A: float) -> float:
-        """The multiple."""
+        """`factor` times the current that the rule gives."""
         return self.factor * obedient_A
 
 
@@ -58,7 +58,7 @@ class PumpFailed(Fault):
 
     @property
     def where(self) -> str:
-        """The pump and its report."""
+        """The coolant pump, and what its report says."""
         return f"coolant pump, reported {self.reported}"
 
 

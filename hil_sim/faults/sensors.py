@@ -43,7 +43,7 @@ class SensorFault(Fault):
 
     @property
     def where(self) -> str:
-        """The sensor."""
+        """Name of the sensor, which ends with its unit."""
         return self.sensor
 
     @abstractmethod
@@ -59,7 +59,7 @@ class SensorStuck(SensorFault):
     kind: Literal["sensor-stuck"]
 
     def reading(self, healthy: float, truth: CellState, memory: SensorMemory) -> float:
-        """The last healthy reading."""
+        """The last healthy reading, whatever the present one is."""
         return memory.last_healthy
 
 
@@ -72,7 +72,7 @@ class SensorDrifting(SensorFault):
     rate_per_s: Finite
 
     def reading(self, healthy: float, truth: CellState, memory: SensorMemory) -> float:
-        """The reading with what has come together since the beginning."""
+        """The reading and rate_per_s times the age of the fault."""
         return healthy + self.rate_per_s * memory.age_s
 
 
@@ -85,7 +85,7 @@ class SensorBiased(SensorFault):
     offset: Finite
 
     def reading(self, healthy: float, truth: CellState, memory: SensorMemory) -> float:
-        """The reading with the constant added."""
+        """The reading and `offset`."""
         return healthy + self.offset
 
 
@@ -98,7 +98,7 @@ class SensorOutOfRange(SensorFault):
     value: Finite
 
     def reading(self, healthy: float, truth: CellState, memory: SensorMemory) -> float:
-        """The value."""
+        """`value`, whatever the present reading is."""
         return self.value
 
 
@@ -111,7 +111,7 @@ class SensorJumping(SensorFault):
     amplitude: Positive
 
     def reading(self, healthy: float, truth: CellState, memory: SensorMemory) -> float:
-        """The reading one amplitude off."""
+        """The reading one amplitude above or below."""
         return healthy + self.amplitude * float(memory.rng.choice((-1.0, 1.0)))
 
 
@@ -123,7 +123,7 @@ class SensorUnitSwapped(SensorFault):
     kind: Literal["sensor-unit-swapped"]
 
     def reading(self, healthy: float, truth: CellState, memory: SensorMemory) -> float:
-        """The number in the wrong unit."""
+        """The reading as a number of degrees Celsius, or of thousandths of its unit."""
         return healthy - _CELSIUS_OFFSET_K if self.sensor.endswith("_K") else _MILLI * healthy
 
 
@@ -135,7 +135,7 @@ class SensorNotAvailable(SensorFault):
     kind: Literal["sensor-not-available"]
 
     def reading(self, healthy: float, truth: CellState, memory: SensorMemory) -> float:
-        """Not a number, which the database sends as all ones."""
+        """NaN, which the database sends as all ones."""
         return math.nan
 
 
@@ -149,7 +149,7 @@ class SurfaceAboveCore(SensorFault):
     excess_K: Positive
 
     def reading(self, healthy: float, truth: CellState, memory: SensorMemory) -> float:
-        """True core temperature and the excess."""
+        """The true core temperature and `excess_K`."""
         return float(truth.core_temperature_K) + self.excess_K
 
 

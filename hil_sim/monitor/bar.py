@@ -36,7 +36,7 @@ class Bar:
         return "yellow" if reached > 1.0 - _NEAR else "green"
 
     def cells(self, width: int) -> str:
-        """The bar in characters."""
+        """The bar as text of `width` characters, with the mark of the limit."""
         filled = self._cell(self.value, width)
         reached = self._cell(self.value + self.bound, width)
         # A bound shows however small it is.

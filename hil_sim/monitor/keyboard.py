@@ -26,7 +26,7 @@ class Keyboard(Closing):
             tty.setcbreak(sys.stdin)
 
     def close(self) -> None:
-        """Put the terminal back."""
+        """Give the terminal back the settings that it had."""
         if self._saved is not None:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._saved)
 

@@ -42,7 +42,7 @@ class Listener(Closing):
         return None if message is None else _classified(message)
 
     def close(self) -> None:
-        """Leave the bus."""
+        """Close the connection to the bus."""
         self._bus.shutdown()
 
 

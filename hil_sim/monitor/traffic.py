@@ -100,7 +100,7 @@ class MessageMeter:
 
 @dataclass
 class ForeignMeter:
-    """Counts what is foreign."""
+    """Counts frames that no message of the database has, by kind and identifier."""
 
     _rate: Rate = field(default_factory=Rate)
     _identifiers: set[int] = field(default_factory=set)
@@ -108,7 +108,7 @@ class ForeignMeter:
     _frames: int = 0
 
     def take(self, time_s: float, frame: Frame | ForeignFrame) -> None:
-        """Count a foreign frame."""
+        """Count a foreign frame that came at a time in s."""
         self._rate.add(time_s)
         self._frames += 1
         if isinstance(frame, ForeignFrame):

@@ -47,7 +47,7 @@ def first_fault(snapshot: Snapshot) -> str:
 
 
 def state(snapshot: Snapshot) -> str:
-    """Name of the ECU's state."""
+    """Name of the ECU's state, n/a before its first report."""
     return snapshot.name("DiagnosticState") or NOT_AVAILABLE
 
 

@@ -7,7 +7,7 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """Seconds that never run backwards."""
+    """A source of time in s that never runs backwards, and a way to wait for a time."""
 
     def now_s(self) -> float:
         """Present time in s from any origin."""
@@ -18,12 +18,12 @@ class Clock(Protocol):
 
 
 class WallClock:
-    """The machine's monotonic clock."""
+    """The machine's monotonic clock, for runs in real time."""
 
     def now_s(self) -> float:
-        """Present time in s."""
+        """Present time in s on that clock."""
         return time.monotonic()
 
     def sleep_until_s(self, time_s: float) -> None:
-        """Sleep until that time."""
+        """Let the thread sleep until that time; return at once when it has passed."""
         time.sleep(max(0.0, time_s - time.monotonic()))

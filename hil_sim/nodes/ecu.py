@@ -26,10 +26,10 @@ class EcuLike(Protocol):
     """The firmware, or a baseline in its place."""
 
     def receive(self, frame_id: int, data: bytes) -> None:
-        """Take in a frame."""
+        """Take in a frame by its identifier and data."""
 
     def step(self) -> None:
-        """Run one control period."""
+        """Run one control period on what was received since the last one."""
 
     def transmit(self) -> Sequence[tuple[int, bytes]]:
         """Frames of this step in order."""

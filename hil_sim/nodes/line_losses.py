@@ -23,7 +23,7 @@ class LineLosses:
 
     @property
     def total(self) -> int:
-        """In both directions."""
+        """Frames lost in both directions together."""
         return self.to_ecu + self.from_ecu
 
     def __str__(self) -> str:
@@ -37,7 +37,7 @@ class LossWatch:
         self.losses = LineLosses()
 
     def pass_on(self, frames: list[Frame]) -> list[Frame]:
-        """The same frames."""
+        """The frames unchanged, after a look for a report of losses among them."""
         for frame in frames:
             if frame.frame_id == LOSS_ID and len(frame.data) == _COUNTS.size:
                 self.losses = LineLosses(*_COUNTS.unpack(frame.data))

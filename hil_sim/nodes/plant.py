@@ -62,7 +62,7 @@ class Answer:
 
     @property
     def usable_command_A(self) -> float | None:
-        """The same in A for a charger, to which the message has to be valid, not just intact."""
+        """Commanded current in A that a charger may use: the message is valid, not only intact."""
         return self.command_A if self._is_command_usable else None
 
     @property
@@ -181,7 +181,10 @@ class PlantNode:
         return counter is not None and self._last_counter in (None, (counter - 1) % COUNTER_MODULUS)
 
     def _follow(self, frames: list[Frame]) -> None:
-        """Also after lost frames and a restart of the ECU, which cost one wait for an answer."""
+        """Keep the counter of the last command.
+
+        After lost frames or a restart of the ECU this costs one wait for an answer.
+        """
         for frame in frames:
             counter = self._command_counter(frame)
             if counter is not None:

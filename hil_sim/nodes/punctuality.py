@@ -42,7 +42,7 @@ class Slots:
         return self.start_s + (len(self.late_s) + self.skipped) * self.period_s
 
     def begin(self, now_s: float) -> None:
-        """The next slot begins."""
+        """Note that the next slot begins at a time in s."""
         self.late_s.append(now_s - self.due_s)
 
     def skip_past(self, now_s: float) -> None:
@@ -52,18 +52,21 @@ class Slots:
 
     @property
     def deadline_s(self) -> float:
-        """How late a slot must not begin."""
+        """Lateness in s from which on a slot counts as missed."""
         return DEADLINE_PERIODS * self.period_s
 
     @property
     def missed(self) -> int:
-        """Number of deadlines missed."""
+        """Number of deadlines missed, by slots that began late and by those skipped."""
         return self.skipped + sum(late_s >= self.deadline_s for late_s in self.late_s)
 
 
 @dataclass(frozen=True)
 class TimeStatistics:
-    """How times are spread, in ms. The jitter is their standard deviation, p99 is one of them."""
+    """Figures of many times, in ms.
+
+    The jitter is their standard deviation; the 99 % quantile p99 is one of the times.
+    """
 
     median_ms: float
     p99_ms: float
@@ -72,7 +75,7 @@ class TimeStatistics:
 
     @classmethod
     def of(cls, times_s: Sequence[float]) -> TimeStatistics | None:
-        """None of no times at all."""
+        """Figures of times in s; None when there are none."""
         if not times_s:
             return None
         times_ms = np.asarray(times_s) * _MS_PER_S

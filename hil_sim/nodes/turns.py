@@ -63,21 +63,21 @@ class LockStep:
 
     @property
     def watch(self) -> PlantWatch | None:
-        """None."""
+        """None, because nothing is measured in virtual time."""
         return None
 
     def wait(self) -> None:
-        """A period is due when the one before is over."""
+        """Return at once: a period is due when the one before is over."""
 
     def begin(self) -> None:
-        """Virtual time is always punctual."""
+        """Do nothing: in virtual time every period begins when it is due."""
 
     def time_s(self, period: int) -> float:
-        """The period's virtual start."""
+        """Virtual start of the period, in s since the start of the run."""
         return period * self._period_s
 
     def answers(self, bus: CanBus, period: int, is_last: IsLast) -> Iterator[Frame]:
-        """Frames up to the ECU's last one."""
+        """Frames up to the last one of the ECU's step, or until it has been silent too long."""
         if self._serve is not None:
             self._serve()
         for _ in range(MOST_FRAMES):
@@ -98,7 +98,7 @@ class _OnTime:
 
     @property
     def watch(self) -> PlantWatch:
-        """How punctual the run is."""
+        """When measurements went out and answers came so far."""
         return self._watch
 
     def wait(self) -> None:
@@ -106,7 +106,7 @@ class _OnTime:
         self._watch.wait(self._clock)
 
     def begin(self) -> None:
-        """Note the time."""
+        """Note that the measurements of the next period go out now."""
         self._watch.begin(self._clock.now_s())
 
 
@@ -120,7 +120,7 @@ class PacedLockStep(_OnTime, LockStep):
         LockStep.__init__(self, period_s, timeout_s, serve)
 
     def answers(self, bus: CanBus, period: int, is_last: IsLast) -> Iterator[Frame]:
-        """Frames up to the ECU's last one."""
+        """The frames of lock step; notes when the last one of the ECU's step came."""
         for frame in super().answers(bus, period, is_last):
             if is_last(frame):
                 self._watch.answered(self._clock.now_s())

@@ -34,10 +34,10 @@ class TrueState:
         self._plant = plant
 
     def receive(self, frame_id: int, data: bytes) -> None:
-        """Frames are not needed."""
+        """Ignore the frame: this view does not depend on the bus."""
 
     def begin(self, plug_in_soc: float) -> None:
-        """The true state of charge is known."""
+        """Do nothing: the true state of charge is known."""
 
     def observe(self, reference_current_A: float) -> Observation:
         """The true state at the start of this period."""
@@ -67,7 +67,7 @@ class BusMeasurements:
                 self._readings[name] = value
 
     def begin(self, plug_in_soc: float) -> None:
-        """Count charge from here."""
+        """Count charge from this state of charge on."""
         self._soc = plug_in_soc
 
     def observe(self, reference_current_A: float) -> Observation:

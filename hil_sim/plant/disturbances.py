@@ -20,7 +20,7 @@ Source = Iterator[Disturbance]
 
 
 class DisturbanceKind(str, Enum):
-    """Names on the command line."""
+    """The kinds of disturbance, by their names on the command line."""
 
     NONE = "none"
     GAUSSIAN = "gaussian"

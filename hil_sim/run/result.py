@@ -140,7 +140,7 @@ CHARGING_STATES = (CommandState.CHARGING.label, DERATED_STATE)
 
 @dataclass(frozen=True)
 class RunResult:
-    """A finished run."""
+    """A finished run: its figures, its course and how punctual it was."""
 
     summary: Summary
     series: TimeSeries

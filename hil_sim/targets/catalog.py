@@ -34,7 +34,7 @@ class Target(Protocol):
 
     @property
     def name(self) -> str:
-        """One of NAMES."""
+        """Name on the command line, one of NAMES."""
         ...
 
     def require_place(self) -> None:
@@ -51,17 +51,17 @@ class Target(Protocol):
 
 @dataclass(frozen=True)
 class LinuxTarget:
-    """A process on vcan0."""
+    """The native program of `make firmware` as a process on vcan0."""
 
     name: str
     program: Path
 
     def require_place(self) -> None:
-        """As Target."""
+        """Raise InputError where there is neither vcan0 nor the guest that has one."""
         require_interface()
 
     def replay(self, recordings: Sequence[Recording]) -> list[list[Answer]]:
-        """As Target."""
+        """Answers of a process that is started anew for each recording."""
         return replay_on_linux(self.program, recordings)
 
 
@@ -78,7 +78,7 @@ class QemuTarget:
     image: Path
 
     def require_place(self) -> None:
-        """As Target."""
+        """Raise InputError where QEMU is not installed."""
         require_emulator()
 
     @contextmanager
@@ -92,7 +92,7 @@ class QemuTarget:
             yield board
 
     def replay(self, recordings: Sequence[Recording]) -> Iterator[list[Answer]]:
-        """As Target."""
+        """Answers of a board that is started anew for each recording."""
         with TemporaryDirectory() as folder:
             for recording in recordings:
                 last_id = recording.database[LAST_MESSAGE].frame_id
@@ -130,7 +130,7 @@ def built_folder(board: str, build: Path = BUILD) -> Path:
 
 
 def find_board(name: str, build: Path = BUILD) -> QemuTarget:
-    """The same for a board; InputError for a target that is none."""
+    """A board by its name; InputError as find_target, and for a target that is no board."""
     target = find_target(name, build)
     if isinstance(target, QemuTarget):
         return target

@@ -101,7 +101,7 @@ class Emulation(Closing):
             return None
 
     def close(self) -> None:
-        """Switch the board off."""
+        """End the emulator; by force when it does not end in time."""
         self._process.terminate()
         try:
             self._process.wait(_STOP_TIMEOUT_S)

@@ -22,7 +22,7 @@ class RemoteEcu:
         self._bus.send(Frame(frame_id, data))
 
     def step(self) -> None:
-        """SYNC was the step."""
+        """Do nothing: the SYNC frame that it received was the step."""
 
     def transmit(self) -> list[tuple[int, bytes]]:
         """Its answer; BusError when none comes or the bus fails."""

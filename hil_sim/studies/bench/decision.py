@@ -48,7 +48,7 @@ def decision_in_c(problem: Problem) -> Peer:
 
 
 def decision_from_python(problem: Problem) -> Peer:
-    """The same, every decision a call of bms.firmware.Firmware."""
+    """The firmware's decision, each a call of bms.firmware.Firmware."""
     rows = problem.sample(SOME)
     calls = _calls(problem, rows)
     decide: Any = problem.firmware.solve

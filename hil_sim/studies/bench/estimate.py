@@ -43,7 +43,7 @@ def estimate_in_c(problem: Problem) -> Peer:
 
 
 def estimate_from_python(problem: Problem) -> Peer:
-    """The same, every estimate a call of bms.firmware.Firmware."""
+    """The firmware's estimate, each a call of bms.firmware.Firmware."""
     rows = problem.sample(SOME)
     calls = [dict(zip(INPUT_NAMES, row)) for row in problem.inputs[rows].tolist()]
     estimate: Any = problem.firmware.estimate

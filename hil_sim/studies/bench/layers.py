@@ -32,7 +32,7 @@ class LayerCounts:
         self._samples: Counter[str] = Counter()
 
     def note(self, frame: FrameType | None) -> None:
-        """Count one sample."""
+        """Count one sample of the stack for the innermost layer on it."""
         while frame is not None:
             path = frame.f_code.co_filename.replace("\\", "/")
             for layer, parts in LAYERS.items():
@@ -43,7 +43,7 @@ class LayerCounts:
         self._samples[REST] += 1
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Forget all samples, such as those from before the first answer."""
         self._samples.clear()
 
     @property

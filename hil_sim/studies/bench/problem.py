@@ -48,12 +48,12 @@ class Problem:
     series: TimeSeries
 
     def sample(self, count: int) -> Rows:
-        """So many of the rows, from all over the charge."""
+        """Numbers of `count` rows, evenly from all over the charge."""
         return np.linspace(0, len(self.lower_A) - 1, count).astype(np.int64)
 
 
 def charge_problem(preset: str, max_time_s: float = 3600.0, seed: int = 0) -> Problem:
-    """From a disturbed charge in closed loop with the preset's own model."""
+    """The problem of a disturbed charge in closed loop with the preset's own model."""
     firmware = Firmware(preset)
     settings = Settings(
         firmware.preset,

@@ -66,7 +66,7 @@ class Quartiles:
 
     @classmethod
     def of(cls, values: Sequence[float]) -> Quartiles:
-        """Of at least one value."""
+        """Quartiles of at least one value."""
         low, high = np.quantile(values, (0.25, 0.75)).tolist()
         return cls(median(values), low, high, len(values))
 

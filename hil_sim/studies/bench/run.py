@@ -28,7 +28,7 @@ Note = Callable[[str], None]
 
 
 class Section(str, Enum):
-    """Names on the command line."""
+    """The sections of the benchmark, by their names on the command line."""
 
     ESTIMATE = "estimate"
     DECISION = "decision"

@@ -17,7 +17,7 @@ _EVENTS_IN_RESERVE = 100
 
 
 class Streams(NamedTuple):
-    """Independent generators of a run."""
+    """Independent random generators of one run."""
 
     draw: np.random.Generator
     disturbance: np.random.Generator

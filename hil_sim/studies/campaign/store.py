@@ -47,11 +47,11 @@ class CampaignFolder:
         return [chunk for chunk in self._settings.chunks() if not self._chunk_path(chunk).exists()]
 
     def store(self, chunk: range, lines: str) -> None:
-        """Keep a finished piece."""
+        """Write the rows of a finished piece, whole or not at all."""
         self._write(self._chunk_path(chunk), lines)
 
     def finish(self) -> None:
-        """Join all pieces to runs.csv."""
+        """Join the pieces, in the order of their runs, to runs.csv."""
         if not self._runs_path.exists():
             pieces = map(self._chunk_path, self._settings.chunks())
             text = header() + "".join(piece.read_text(encoding="utf-8") for piece in pieces)

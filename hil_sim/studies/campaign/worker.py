@@ -37,7 +37,7 @@ def run_chunk(settings: CampaignSettings, runs: Iterable[int]) -> str:
 
 
 def header() -> str:
-    """First line of runs.csv."""
+    """First line of runs.csv: the names of its columns."""
     return ",".join(columns()) + "\n"
 
 

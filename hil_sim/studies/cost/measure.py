@@ -44,7 +44,7 @@ class CostReport:
     """(N,) the periods with a decision, which the figures of a charge are taken from."""
 
     def to_json(self) -> dict[str, Any]:
-        """Figures by kind of work."""
+        """Board, unit, and by kind of work its costs in instructions."""
         return {
             "board": self.board,
             "unit": "instructions",

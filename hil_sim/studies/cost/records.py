@@ -44,7 +44,7 @@ class Counts(NamedTuple):
 
 
 def restart() -> bytes:
-    """The ECU starts anew."""
+    """Record that makes the ECU start anew."""
     return _record(_RESTART, b"")
 
 
@@ -56,7 +56,10 @@ def period(frames: Sequence[Frame]) -> bytes:
 
 
 def state(state: State) -> bytes:
-    """An estimate and a decision that do not belong together; filtered inputs are 0."""
+    """Record of an estimate and of a decision on one state, each for itself.
+
+    The decision does not take the estimate; filtered inputs are 0.
+    """
     measured = (
         state.current_A,
         state.cooling_power_W,
