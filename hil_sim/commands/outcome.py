@@ -1,4 +1,4 @@
-"""What the charging commands have in common: run, show, write, exit code."""
+"""What the charging commands have in common: settings, run, show, write, exit code."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.presets import Preset
+from hil_sim.faults import load_faults
 from hil_sim.logs import usable_format
 from hil_sim.logs.recorder import Recorder
+from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.report.files import summary_json, write_report
 from hil_sim.report.folder import OutputFolder
 from hil_sim.report.table import print_table
@@ -29,6 +32,30 @@ class Run(Protocol):
     ) -> RunResult:
         """Run a charge to its end; `progress` is told the state of charge of each period."""
         ...
+
+
+def charge_settings(
+    preset: Preset,
+    bus: str,
+    seed: int,
+    disturbance: DisturbanceKind,
+    faults: Path | None,
+    max_time_s: float,
+    realtime: bool,
+) -> Settings:
+    """What the options that all charging commands have say of a run.
+
+    Raises InputError for a file of faults that cannot be used.
+    """
+    return Settings(
+        preset=preset,
+        bus=bus,
+        seed=seed,
+        disturbance=disturbance,
+        faults=() if faults is None else load_faults(faults),
+        max_time_s=max_time_s,
+        realtime=realtime,
+    )
 
 
 def charge_and_report(

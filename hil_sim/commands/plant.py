@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated
 
 import typer
 
 from bms.presets import load_preset
 from hil_sim.commands import options
-from hil_sim.commands.outcome import charge_and_report
-from hil_sim.faults import load_faults
+from hil_sim.commands.outcome import charge_and_report, charge_settings
 from hil_sim.plant.disturbances import DisturbanceKind
-from hil_sim.run.session import Settings, run_plant
+from hil_sim.run.session import run_plant
 
 
 def plant(
@@ -41,14 +41,8 @@ def plant(
 
     Example: bms plant --bus socketcan:vcan0 --seed 1 --out out/run
     """
-    settings = Settings(
-        preset=load_preset(preset),
-        bus=bus,
-        seed=seed,
-        disturbance=disturbance,
-        faults=() if faults is None else load_faults(faults),
-        max_time_s=max_time_s,
-        realtime=realtime,
-        answer_timeout_s=answer_timeout_s,
+    settings = charge_settings(
+        load_preset(preset), bus, seed, disturbance, faults, max_time_s, realtime
     )
+    settings = replace(settings, answer_timeout_s=answer_timeout_s)
     return charge_and_report(settings, run_plant, out, json, log=log)

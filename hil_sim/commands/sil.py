@@ -13,8 +13,7 @@ from bms.model.pair import load_pair
 from bms.presets import load_preset
 from hil_sim.bus.buses import is_serial_line
 from hil_sim.commands import options
-from hil_sim.commands.outcome import charge_and_report
-from hil_sim.faults import load_faults
+from hil_sim.commands.outcome import charge_and_report, charge_settings
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.session import ControllerKind, Settings, run_sil
 from hil_sim.targets.catalog import find_board
@@ -77,16 +76,10 @@ def sil(
             )
         # Of an ECU elsewhere, preset and model are not a choice but what it has to have.
         cell, expected = load_pair(preset, model) if is_remote else (load_preset(preset), model)
-        settings = Settings(
-            preset=cell,
+        settings = replace(
+            charge_settings(cell, bus, seed, disturbance, faults, max_time_s, realtime),
             controller=controller,
             model=expected,
-            bus=bus,
-            seed=seed,
-            disturbance=disturbance,
-            faults=() if faults is None else load_faults(faults),
-            max_time_s=max_time_s,
-            realtime=realtime,
         )
         own_bus = Settings.bus if is_remote else bus
         second = None if baseline is None else replace(settings, controller=baseline, bus=own_bus)

@@ -16,6 +16,7 @@ from pathlib import Path
 from bms.errors import BmsError
 from bms.native_build import FIRMWARE
 from hil_sim.replay.engine import replay
+from hil_sim.replay.identity import choose_pair
 from hil_sim.replay.recording import load_recording
 
 UNUSABLE = 2
@@ -41,8 +42,7 @@ def main() -> None:
 
 
 def _replay(log: Path, preset: str | None, model: Path | None) -> list[list[tuple[int, str]]]:
-    from bms.firmware import Ecu  # noqa: PLC0415 -- only now is the right build in place
-    from hil_sim.replay.identity import choose_pair  # noqa: PLC0415
+    from bms.firmware import Ecu  # noqa: PLC0415 (the build has to be in place first)
 
     recording = load_recording(log)
     answers = replay(recording, Ecu(*choose_pair(recording, preset, model)))

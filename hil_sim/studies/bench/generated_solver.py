@@ -80,7 +80,7 @@ def generated_solver(problem: Problem) -> Iterator[Peer]:
 
 def _compiled(folder: Path) -> Path:
     import cvxpy  # noqa: PLC0415 (an optional extra, and slow to import)
-    from cvxpygen import cpg  # noqa: PLC0415
+    from cvxpygen import cpg  # noqa: PLC0415 (an optional extra)
 
     current = cvxpy.Variable(name="current")
     reference, lower, upper = (

@@ -110,6 +110,7 @@ def _estimate(result: Result, problem: Problem, repetitions: int, clock_ns: Cloc
     peers: list[Peer | Absent] = [estimate_in_c(problem), estimate_from_python(problem)]
     peers += scipy_estimates(problem)
     if _is_installed("torch", "kan"):
+        # PyTorch is an optional extra.
         from hil_sim.studies.bench.torch_estimate import pykan_estimates, torch_perceptron  # noqa: PLC0415
 
         perceptron = torch_perceptron(problem)
