@@ -21,7 +21,7 @@ from hil_sim.report.files import summary_json, write_report
 from hil_sim.report.folder import OutputFolder
 from hil_sim.report.table import print_table
 from hil_sim.run.result import RunResult
-from hil_sim.run.session import Settings
+from hil_sim.run.settings import Settings
 
 
 class Run(Protocol):

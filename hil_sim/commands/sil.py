@@ -15,7 +15,8 @@ from hil_sim.bus.buses import is_serial_line
 from hil_sim.commands import options
 from hil_sim.commands.outcome import charge_and_report, charge_settings
 from hil_sim.plant.disturbances import DisturbanceKind
-from hil_sim.run.session import ControllerKind, Settings, run_sil
+from hil_sim.run.session import run_sil
+from hil_sim.run.settings import ControllerKind, Settings
 from hil_sim.targets.catalog import find_board
 
 

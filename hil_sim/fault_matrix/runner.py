@@ -10,7 +10,8 @@ from bms.model.model_file import KanModel
 from bms.presets import Preset
 from hil_sim.fault_matrix.matrix import Row
 from hil_sim.fault_matrix.verdict import Verdict, judge
-from hil_sim.run.session import Settings, run_both, run_on_clocks
+from hil_sim.run.session import run_both, run_on_clocks
+from hil_sim.run.settings import Settings
 from hil_sim.run.workforce import local_workforce
 
 VIRTUAL = "virtual:"

@@ -11,7 +11,7 @@ from hil_sim.report.folder import OutputFolder
 from hil_sim.report.page import data_url, render_page
 from hil_sim.report.timing import timing_chart, timing_figures
 from hil_sim.run.result import RunResult
-from hil_sim.run.session import Settings
+from hil_sim.run.settings import Settings
 
 
 def summary_json(results: list[RunResult]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from rich.table import Table
 from hil_sim.report.figures import figures
 from hil_sim.report.timing import timing_figures
 from hil_sim.run.result import RunResult
-from hil_sim.run.session import Settings
+from hil_sim.run.settings import Settings
 
 
 def print_table(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -146,35 +145,3 @@ class RunResult:
     series: TimeSeries
     watch: PlantWatch | None = None
     """Every time behind the summary's timing; None where time was virtual."""
-
-
-def first_derate_s(series: TimeSeries) -> float | None:
-    """First time in s at which a constraint allowed less than was asked for."""
-    derated = (t for t, state in zip(series.time_s, series.state) if state == DERATED_STATE)
-    return next(derated, None)
-
-
-def infeasible_steps(series: TimeSeries) -> int:
-    """Control periods of the charge in which the constraints left no current but 0 A."""
-    return sum(
-        feasible is False and state in CHARGING_STATES
-        for feasible, state in zip(series.feasible, series.state)
-    )
-
-
-def estimate_errors_K(series: TimeSeries) -> list[float]:
-    """Estimated less true core temperature (K) in every period of the charge with an estimate."""
-    return [
-        estimate - truth
-        for time_s, estimate, truth in zip(
-            series.time_s, series.estimated_core_temperature_K, series.core_temperature_K
-        )
-        if estimate is not None and time_s >= 0.0
-    ]
-
-
-def rmse_K(errors_K: list[float]) -> float | None:
-    """Root of the mean square, None for no errors."""
-    if not errors_K:
-        return None
-    return math.sqrt(math.fsum(error * error for error in errors_K) / len(errors_K))

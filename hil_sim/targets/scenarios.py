@@ -12,7 +12,8 @@ from hil_sim.fault_matrix.matrix import Row
 from hil_sim.fault_matrix.runner import MatrixSettings, run_settings
 from hil_sim.logs.recorder import Recorder
 from hil_sim.replay.recording import Recording, load_recording
-from hil_sim.run.session import Settings, run_both
+from hil_sim.run.session import run_both
+from hil_sim.run.settings import Settings
 
 FULL_CHARGE = "full charge"
 

@@ -14,7 +14,7 @@ import pytest
 from bms.cell import CellState, integrate_step
 from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.faults import load_faults
-from hil_sim.run.session import Settings
+from hil_sim.run.settings import Settings
 from hil_sim.studies.bench import simulation
 from hil_sim.studies.bench.generated_solver import GENERATED
 from hil_sim.studies.bench.layers import sampled

@@ -9,7 +9,8 @@ from bms.cell import CellState
 from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset
 from hil_sim.plant.disturbances import DisturbanceKind, disturbance_source
-from hil_sim.run.session import ControllerKind, Settings, run_both
+from hil_sim.run.session import run_both
+from hil_sim.run.settings import ControllerKind, Settings
 from hil_sim.studies.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
 from hil_sim.studies.campaign.settings import CampaignSettings
 

@@ -10,7 +10,8 @@ from bms.model.model_file import shipped_model_path
 from bms.presets import load_preset
 from hil_sim.logs.recorder import Recorder
 from hil_sim.plant.disturbances import DisturbanceKind
-from hil_sim.run.session import ControllerKind, Settings, run_both
+from hil_sim.run.session import run_both
+from hil_sim.run.settings import ControllerKind, Settings
 from tests.hil_sim.ecus import Contradicting, HotterThanAllowed, OftenDamaged, SilentAfter
 
 SHORT_S = 20.0

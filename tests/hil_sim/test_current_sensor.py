@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from hil_sim.faults import parse_fault
-from hil_sim.run.session import Settings, run_both
+from hil_sim.run.session import run_both
+from hil_sim.run.settings import Settings
 
 
 @pytest.mark.parametrize("offset_A", [-0.5, 0.3, 0.5])

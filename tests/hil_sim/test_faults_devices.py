@@ -13,7 +13,8 @@ from hil_sim.bus.buses import Frame
 from hil_sim.bus.database import load_codecs
 from hil_sim.faults import Injection, parse_fault
 from hil_sim.plant.sensors import Readings
-from hil_sim.run.session import Settings, run_both, run_plant
+from hil_sim.run.session import run_both, run_plant
+from hil_sim.run.settings import Settings
 
 HEALTHY = Readings(-10.0, 3.3, 300.0, 299.0, 0.25)
 TRUTH = CellState(0.5, 303.0, 300.0, 299.0)

@@ -16,7 +16,8 @@ import pytest
 
 from hil_sim.logs import LogFrame, read_log
 from hil_sim.logs.recorder import Recorder
-from hil_sim.run.session import Settings, run_both
+from hil_sim.run.session import run_both
+from hil_sim.run.settings import Settings
 from tests.hil_sim.command_line import bms
 from tests.hil_sim.test_vcan import HAS_GUEST, HAS_VCAN, MISSING, run_in_guest
 

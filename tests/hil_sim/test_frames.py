@@ -11,7 +11,8 @@ from cantools import autosar
 
 from bms.model import load_shipped_model
 from hil_sim.logs.recorder import Recorder
-from hil_sim.run.session import Settings, run_both
+from hil_sim.run.session import run_both
+from hil_sim.run.settings import Settings
 
 DATABASE = cantools.database.load_string(
     files("codegen").joinpath("can/bms.dbc").read_text(), "dbc"

@@ -24,7 +24,8 @@ from bms.firmware import Ecu
 from hil_sim.bus.buses import Frame, open_bus
 from hil_sim.monitor.listener import ForeignFrame, Listener
 from hil_sim.nodes.ecu import EcuNode
-from hil_sim.run.session import Settings, run_plant
+from hil_sim.run.session import run_plant
+from hil_sim.run.settings import Settings
 from tests.hil_sim.command_line import bms
 from tests.hil_sim.slcan_hub import FRAMES, SlcanHub
 

@@ -19,7 +19,8 @@ from bms.model.pair import load_pair
 from hil_sim.bus.catalog import FrameId
 from hil_sim.logs.recorder import Recorder
 from hil_sim.nodes.line_losses import LOSS_ID
-from hil_sim.run.session import Settings, run_both, run_on_clocks, run_plant, run_sil
+from hil_sim.run.session import run_both, run_on_clocks, run_plant, run_sil
+from hil_sim.run.settings import Settings
 from hil_sim.targets import Emulation
 from hil_sim.targets.catalog import QemuTarget, find_board
 from tests.firmware.ports import ROOT, built, image, needs_emulator

@@ -11,7 +11,8 @@ from hil_sim.nodes.python_ecu import PythonEcu
 from hil_sim.nodes.views import BusMeasurements, TrueState
 from hil_sim.plant.disturbances import DisturbanceKind, disturbance_source
 from hil_sim.plant.plant import Plant
-from hil_sim.run.session import ControllerKind, Settings, run_both
+from hil_sim.run.session import run_both
+from hil_sim.run.settings import ControllerKind, Settings
 
 MEASURED = {
     "CellElectrical": {"Current": -10.0, "Voltage": 3.3},

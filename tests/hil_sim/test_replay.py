@@ -17,7 +17,8 @@ from hil_sim.replay.engine import replay, write_replayed
 from hil_sim.replay.identity import choose_pair
 from hil_sim.replay.recording import load_recording
 from hil_sim.replay.signals import Signals
-from hil_sim.run.session import Settings, run_both, run_on_clocks
+from hil_sim.run.session import run_both, run_on_clocks
+from hil_sim.run.settings import Settings
 from tests.hil_sim.golden.record import FOLDER
 
 START, LAGGED = FOLDER / "charge_start.log.gz", FOLDER / "lagged_model.log.gz"

@@ -14,7 +14,8 @@ from bms.errors import InputError
 from hil_sim.report.figures import figures, seconds_by_constraint
 from hil_sim.report.files import report_page, summary_json, write_report
 from hil_sim.report.folder import OutputFolder
-from hil_sim.run.session import ControllerKind, Settings, run_both
+from hil_sim.run.session import run_both
+from hil_sim.run.settings import ControllerKind, Settings
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

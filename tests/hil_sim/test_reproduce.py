@@ -13,7 +13,7 @@ from bms.presets import load_preset
 from bms.studies.paper_fit.figures import FIGURES
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.result import RunResult
-from hil_sim.run.session import ControllerKind
+from hil_sim.run.settings import ControllerKind
 from hil_sim.studies.reproduction.comparison import compare_with_paper
 from hil_sim.studies.reproduction.files import content_json, runs_csv
 from hil_sim.studies.reproduction.margins import MARGINS, OURS_TOGETHER

@@ -6,7 +6,8 @@ import pytest
 
 from hil_sim.faults import parse_fault
 from hil_sim.plant.disturbances import DisturbanceKind
-from hil_sim.run.session import Settings, run_both
+from hil_sim.run.session import run_both
+from hil_sim.run.settings import Settings
 
 SURFACE_DEFICIT, OUT_OF_DOMAIN, CORE_TOO_HOT = 19, 10, 14
 

@@ -11,7 +11,8 @@ import pytest
 
 from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.logs.recorder import Recorder
-from hil_sim.run.session import Settings, run_both
+from hil_sim.run.session import run_both
+from hil_sim.run.settings import Settings
 
 GUEST = Path(__file__).parents[2] / "tools" / "vcan_guest.sh"
 HAS_VCAN = Path("/sys/class/net/vcan0").exists()

@@ -16,7 +16,8 @@ from hil_sim.bus.buses import Frame
 from hil_sim.logs.recorder import PeriodRecorder
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.result import TimeSeries
-from hil_sim.run.session import Settings, run_both
+from hil_sim.run.session import run_both
+from hil_sim.run.settings import Settings
 from hil_sim.studies.bench.race import Rows
 
 _BUS = "virtual:bench-problem"

@@ -16,7 +16,8 @@ from tempfile import TemporaryDirectory
 from bms.errors import BusError
 from bms.presets import load_preset
 from hil_sim.logs.recorder import Recorder
-from hil_sim.run.session import Settings, run_both, run_plant
+from hil_sim.run.session import run_both, run_plant
+from hil_sim.run.settings import Settings
 from hil_sim.studies.bench.layers import sampled
 from hil_sim.studies.bench.race import Clocks, Quartiles
 from hil_sim.targets.linux import GUEST

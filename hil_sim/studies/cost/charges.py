@@ -13,7 +13,8 @@ from bms.presets import Preset
 from hil_sim.logs.recorder import PeriodRecorder
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.result import CHARGING_STATES
-from hil_sim.run.session import Settings, run_both
+from hil_sim.run.session import run_both
+from hil_sim.run.settings import Settings
 from hil_sim.studies.cost.records import period, restart
 
 SHORT_CHARGE_S = 8.0

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bms.presets import Preset
-from hil_sim.run.session import Settings
+from hil_sim.run.settings import Settings
 from hil_sim.studies.cost.charges import charge_records, random_charges
 from hil_sim.studies.cost.counting import count
 from hil_sim.studies.cost.search import search_states

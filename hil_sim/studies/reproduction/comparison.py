@@ -10,7 +10,7 @@ from bms.studies.paper_fit.figures import FIGURES
 from bms.studies.paper_fit.fit import CORE_TIME_CONSTANT_S, FREE_PARAMETERS
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.report.figures import seconds_by_constraint
-from hil_sim.run.session import ControllerKind
+from hil_sim.run.settings import ControllerKind
 from hil_sim.studies.reproduction.margins import SINGLE_MARGINS
 from hil_sim.studies.reproduction.runs import DISTURBANCES, Case, Results
 

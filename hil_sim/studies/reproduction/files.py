@@ -13,7 +13,7 @@ from hil_sim.report.chart import charge_chart, estimate_chart
 from hil_sim.report.folder import OutputFolder
 from hil_sim.report.page import data_url, render_page
 from hil_sim.run.result import Summary
-from hil_sim.run.session import ControllerKind
+from hil_sim.run.settings import ControllerKind
 from hil_sim.studies.reproduction.comparison import compare_with_paper
 from hil_sim.studies.reproduction.runs import DISTURBANCES, Case, Results
 from hil_sim.studies.reproduction.sections import BAD, passed, sections

@@ -14,7 +14,8 @@ from bms.firmware import Ecu
 from bms.presets import load_preset
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.result import RunResult
-from hil_sim.run.session import ControllerKind, Settings, run_both
+from hil_sim.run.session import run_both
+from hil_sim.run.settings import ControllerKind, Settings
 from hil_sim.studies.reproduction.margins import MARGINS, Margin
 
 PRESETS = ("paper_calibrated", "lin2014")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from bms.presets import Preset
 from hil_sim.run.result import Summary
-from hil_sim.run.session import ControllerKind
+from hil_sim.run.settings import ControllerKind
 from hil_sim.studies.reproduction.comparison import PaperComparison, compare_with_paper
 from hil_sim.studies.reproduction.margins import EVERYTHING, MARGINS, OURS_TOGETHER
 from hil_sim.studies.reproduction.runs import DISTURBANCES, Case, Results

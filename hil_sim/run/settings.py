@@ -1,0 +1,48 @@
+"""What determines a run: preset, controller, bus, seed, faults, times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from bms.model.model_file import KanModel
+from bms.presets import Preset
+from bms.presets.schema import Initial
+from hil_sim.faults import Fault
+from hil_sim.plant.disturbances import DisturbanceKind
+
+ANSWER_TIMEOUT_S = 1.0
+
+
+class ControllerKind(str, Enum):
+    """Names on the command line: the firmware, and each of bms.baselines.BASELINES."""
+
+    KAN_RCBF = "kan-rcbf"
+    S_CBF = "s-cbf"
+    S_CBF_SINGLE_STEP = "s-cbf-single-step"
+    CC_CV = "cc-cv"
+    MULTI_STAGE = "multi-stage"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What determines a run. The delay is in control periods, the time limit from the edge.
+
+    A run that does not end early goes on to the time limit whatever the ECU says.
+    """
+
+    preset: Preset
+    controller: ControllerKind = ControllerKind.KAN_RCBF
+    model: Path | KanModel | None = None
+    bus: str = "virtual:bms"
+    seed: int = 0
+    disturbance: DisturbanceKind = DisturbanceKind.NONE
+    charger_delay_periods: int = 0
+    max_time_s: float = 3600.0
+    realtime: bool = False
+    answer_timeout_s: float = ANSWER_TIMEOUT_S
+    faults: tuple[Fault, ...] = ()
+    ends_early: bool = True
+    initial: Initial | None = None
+    """State of the cell at the start; that of the preset without."""
