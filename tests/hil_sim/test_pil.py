@@ -37,6 +37,11 @@ def settings():
     return Settings(preset, model=model, seed=SEED)
 
 
+def test_a_report_of_losses_is_known_by_the_identifier_that_the_firmware_gives_it():
+    header = (ROOT / "firmware_c" / "port" / "slcan_link.h").read_text()
+    assert f"#define SLCAN_LINK_LOSS_ID 0x{LOSS_ID:03X}u\n" in header
+
+
 @needs_emulator
 def test_a_full_charge_over_the_serial_line_gives_the_frames_of_the_virtual_bus(settings, tmp_path):
     with Recorder(tmp_path / "host.log") as recorder:
