@@ -15,19 +15,11 @@ import pytest
 import yaml
 
 from bms.native_build import ROOT
+from tests.examples.shell import run
 
 EXAMPLE = ROOT / "examples" / "ci"
 SCRIPT = EXAMPLE / "charge_and_faults.sh"
 WORKFLOW = EXAMPLE / "workflow.yml"
-BMS = f"""
-import sys
-if __name__ == "__main__":
-    # python-can imports asammdf where it is, which takes seconds here and is not needed.
-    sys.modules["asammdf"] = None
-    sys.path.insert(0, {str(ROOT)!r})
-    from bms.cli import main
-    main()
-"""
 SCHEMA_CHECK = "check_jsonschema"
 needs_schema_check = pytest.mark.skipif(
     importlib.util.find_spec(SCHEMA_CHECK) is None and "CI" not in os.environ,
@@ -35,29 +27,9 @@ needs_schema_check = pytest.mark.skipif(
 )
 
 
-def run_script(
-    folder: Path, interpreter: str, program: str, *options: str
-) -> subprocess.CompletedProcess[str]:
-    """The script as a pipeline runs it, with this program as `bms`."""
-    command = folder / "bin" / "bms"
-    command.parent.mkdir()
-    command.write_text(f"#!{interpreter}\n{program}")
-    command.chmod(0o755)
-    environment = {**os.environ, "PATH": f"{command.parent}:{os.environ['PATH']}"}
-    return subprocess.run(
-        [SCRIPT, "out", *options],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-
-
 @pytest.mark.slow
 def test_the_script_charges_plays_the_rows_and_leaves_a_case_for_each(tmp_path: Path) -> None:
-    done = run_script(tmp_path, sys.executable, BMS, "--rows", "lost once")
+    done = run([SCRIPT, "out", "--rows", "lost once", "--jobs", "1"], tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     summary = json.loads((tmp_path / "out" / "charge" / "summary.json").read_text())
     assert (summary["stop_reason"], summary["limits_kept"]) == ("complete", True)
@@ -76,8 +48,8 @@ def test_the_script_charges_plays_the_rows_and_leaves_a_case_for_each(tmp_path: 
 def test_the_script_runs_both_commands_and_fails_when_either_does(
     tmp_path: Path, charge_code: int, matrix_code: int, code: int
 ) -> None:
-    program = f'echo "$@"\n[ "$1" != sil ] || exit {charge_code}\nexit {matrix_code}\n'
-    done = run_script(tmp_path, "/bin/sh", program, "--rows", "lost once")
+    bms = f'#!/bin/sh\necho "$@"\n[ "$1" != sil ] || exit {charge_code}\nexit {matrix_code}\n'
+    done = run([SCRIPT, "out", "--rows", "lost once"], tmp_path, bms)
     assert done.stdout.splitlines() == [
         "sil --out out/charge",
         "fault-matrix --rows lost once --out out/faults",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 import shutil
-import subprocess
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,16 +12,17 @@ from typing import Any
 import pytest
 from cffi import FFI
 
-from bms.model.model_file import load_shipped_model
 from bms.native_build import CORE_HEADERS, ROOT
 from bms.presets import load_preset
-from codegen.core_sources import core_sources, write_core
-from tests.codegen.cmake import build, needs_cmake
+from tests.codegen.cmake import needs_cmake
+from tests.examples.shell import run
 from tests.firmware.native_library import load_library
 from tests.firmware.ports import needs_emulator
 
 EXAMPLE = ROOT / "examples" / "own_mcu"
 CORE = ROOT / "firmware_c"
+PAGE = ROOT / "docs" / "core-without-frames.md"
+STATES = 6
 PRESET = load_preset("paper_calibrated")
 GROWTH_A = -PRESET.limits.current_growth_A_per_s * PRESET.timing.sampling_period_s
 STRONGEST_A = PRESET.limits.reference_current_A
@@ -173,23 +173,45 @@ def test_broken_on_purpose_the_same_period_brings_a_current(
     assert broken.step(**period) < 0.0
 
 
-@pytest.fixture(scope="module")
-def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("own") / "core"
-    write_core(folder, core_sources(PRESET, load_shipped_model(PRESET.name)))
-    return folder
+def text_blocks(language: str) -> list[str]:
+    page = PAGE.read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", ["control.h", "control.c", "main.c"])
+def test_the_page_shows_the_code_of_the_example(name: str) -> None:
+    assert (EXAMPLE / name).read_text(encoding="utf-8") in text_blocks("c")
 
 
 @pytest.fixture(scope="module")
-def on_host(core: Path) -> str:
-    folder = build(EXAMPLE, core.parent / "host", f"-DBMS_CORE={core}")
-    return subprocess.run([folder / "own_mcu"], capture_output=True, text=True, check=True).stdout
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A place to run the page's commands in, where the examples are."""
+    place = tmp_path_factory.mktemp("own mcu")
+    (place / "examples").symlink_to(ROOT / "examples")
+    return place
 
 
+@pytest.fixture(scope="module")
+def on_host(folder: Path) -> list[str]:
+    """What the page's commands for the host print in the end."""
+    host, _ = text_blocks("sh")
+    done = run(["sh", "-eu", "-c", host], folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "warning" not in done.stderr
+    return done.stdout.splitlines()[-STATES:]
+
+
+@pytest.mark.slow
 @needs_cmake
-def test_each_state_gets_the_decision_that_it_calls_for(on_host: str) -> None:
-    rows = {match["name"]: match for match in map(LINE.fullmatch, on_host.splitlines()) if match}
-    assert len(rows) == len(on_host.splitlines())
+def test_the_commands_of_the_page_print_what_it_shows(on_host: list[str]) -> None:
+    (shown,) = text_blocks("text")
+    assert shown.splitlines() == on_host
+
+
+@pytest.mark.slow
+@needs_cmake
+def test_each_state_gets_the_decision_that_it_calls_for(on_host: list[str]) -> None:
+    rows = {match["name"]: match for match in map(LINE.fullmatch, on_host) if match}
     reasons = {name: (int(row["active"]), int(row["fault"])) for name, row in rows.items()}
     assert reasons == {
         "cold and empty": (NONE, NO_FAULT),
@@ -211,17 +233,9 @@ def test_each_state_gets_the_decision_that_it_calls_for(on_host: str) -> None:
 @pytest.mark.slow
 @needs_cmake
 @needs_emulator
-def test_a_cortex_m4f_prints_the_same_to_the_last_bit(core: Path, on_host: str) -> None:
-    toolchain = f"-DCMAKE_TOOLCHAIN_FILE={EXAMPLE / 'board' / 'cortex_m4f.cmake'}"
-    options = (f"-DBMS_CORE={core}", toolchain, "-DCMAKE_BUILD_TYPE=MinSizeRel")
-    folder = build(EXAMPLE, core.parent / "target", *options)
-    command = ["qemu-system-arm", "-machine", "mps2-an386", "-nographic", "-semihosting"]
-    done = subprocess.run(
-        [*command, "-kernel", folder / "own_mcu.elf"],
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert (done.returncode, done.stdout) == (0, on_host)
+def test_a_cortex_m4f_prints_the_same_to_the_last_bit(folder: Path, on_host: list[str]) -> None:
+    _, board = text_blocks("sh")
+    done = run(["sh", "-eu", "-c", board], folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "warning" not in done.stderr
+    assert done.stdout.splitlines()[-STATES:] == on_host
