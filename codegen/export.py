@@ -1,4 +1,4 @@
-"""`bms export`: C sources and calibration part for a model and a preset."""
+"""`bms export`: what the firmware takes from a model and a preset, or the whole C core with it."""
 
 from __future__ import annotations
 
@@ -7,18 +7,31 @@ from typing import Annotated
 
 import typer
 
+from bms.errors import InputError
 from bms.image import calibration_part
 from bms.model.model_file import load_model, load_shipped_model
 from bms.presets import DEFAULT_PRESET, load_preset
 from codegen.calibration_source import calibration_source
 from codegen.can_sources import can_sources
+from codegen.core_sources import core_sources, write_core
 from codegen.rendering import write_files
 
 CALIBRATION_FILE = "calibration.bin"
 
 
 def export(
-    out: Annotated[Path, typer.Option(help="Folder for the C sources; created when absent.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for the generated C sources and calibration.bin; created when absent."
+        ),
+    ] = None,
+    sources: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for the whole C core, to be built by CMake; created when absent."
+        ),
+    ] = None,
     preset: Annotated[
         str, typer.Option(help="Preset by name, or path of a .toml file.")
     ] = DEFAULT_PRESET,
@@ -26,21 +39,32 @@ def export(
         Path | None, typer.Option(help="Model JSON of 'bms train'. Default: the preset's own.")
     ] = None,
 ) -> None:
-    """Write what the firmware takes from a model: generated C sources and a calibration part.
+    """Write what the firmware takes from a model, or the C core with it for a project of your own.
 
-    The sources are controller constants, KAN tables and CAN codec. calibration.bin holds the same
-    constants and tables for 'bms flash --calibration'.
+    With --out: controller constants, KAN tables and CAN codec as C sources; calibration.bin holds
+    the same constants and tables for 'bms flash --calibration'. With --sources: headers and sources
+    of the core with these generated ones, a CMakeLists.txt and a README that says how to call it.
 
     Temperatures in K, currents in A (negative while charging), times in s.
 
     Example: bms export --model model.json --preset paper_calibrated --out out/export
     """
+    if out is None and sources is None:
+        raise InputError("export: no folder is named; add --out DIR, --sources DIR or both")
     chosen = load_preset(preset)
     estimator = load_model(model) if model else load_shipped_model(chosen.name)
-    contents: dict[str, str | bytes] = {
-        **can_sources(),
-        **calibration_source(chosen, estimator),
-        CALIBRATION_FILE: calibration_part(chosen, estimator),
-    }
-    for path in write_files(out, contents):
+    generated: dict[str, str | bytes] = {}
+    if out is not None:
+        generated = {
+            **can_sources(),
+            **calibration_source(chosen, estimator),
+            CALIBRATION_FILE: calibration_part(chosen, estimator),
+        }
+    core = core_sources(chosen, estimator) if sources is not None else {}
+    written: list[Path] = []
+    if out is not None:
+        written += write_files(out, generated)
+    if sources is not None:
+        written += write_core(sources, core)
+    for path in written:
         print(path)

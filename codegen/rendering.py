@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -60,17 +61,22 @@ def initialiser(value: Any, depth: int = 0) -> str:
 def write_files(folder: Path, contents: Mapping[str, str | bytes]) -> list[Path]:
     """Write all files or none: they are completed under other names first and then renamed.
 
-    Raises InputError when the folder cannot be written, or a folder stands where a file has to go.
+    Names are paths in the folder; the folders in between are created. Raises InputError when a
+    folder cannot be written, or a folder stands where a file has to go.
     """
     for target in (folder / name for name in contents):
         if target.is_dir():
             raise InputError(f"{target}: is a folder; choose another one for the files")
+    created: list[Path] = []
     staged: list[tuple[Path, Path]] = []
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         for name, content in contents.items():
-            handle, temporary = tempfile.mkstemp(dir=folder, prefix=f".{name}.")
-            staged.append((Path(temporary), folder / name))
+            target = folder / name
+            for path in _missing_folders(target.parent):
+                path.mkdir()
+                created.append(path)
+            handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+            staged.append((Path(temporary), target))
             with os.fdopen(handle, "wb") as file:
                 file.write(content.encode() if isinstance(content, str) else content)
         for source, target in staged:
@@ -79,7 +85,15 @@ def write_files(folder: Path, contents: Mapping[str, str | bytes]) -> list[Path]
     except OSError as error:
         for source, _ in staged:
             source.unlink(missing_ok=True)
+        for path in reversed(created):
+            with suppress(OSError):  # what others have put there meanwhile stays
+                path.rmdir()
         raise InputError(
             f"{folder}: cannot be written ({error.strerror}); choose a folder that can"
         ) from None
     return [target for _, target in staged]
+
+
+def _missing_folders(folder: Path) -> list[Path]:
+    """The folder and those that it lies in, as far as they are missing, the outermost first."""
+    return [path for path in (*reversed(folder.parents), folder) if not path.exists()]

@@ -5,7 +5,7 @@
 # firmware it then fails, unless compiler and emulator are there in another way than as Debian's packages.
 set -eu
 packages="gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"
-[ "${1:-}" = firmware ] || packages="$packages user-mode-linux can-utils iproute2"
+[ "${1:-}" = firmware ] || packages="$packages g++ user-mode-linux can-utils iproute2"
 missing=""
 for package in $packages; do
   dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q "install ok installed" || missing="$missing $package"

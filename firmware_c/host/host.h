@@ -12,6 +12,10 @@
 #include "image.h"
 #include "monitor.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 const bms_calibration_t *host_default_calibration(void);
 const fault_policy_t *host_fault_policies(void);
 const codec_message_t *host_transmitted_messages(void);
@@ -32,5 +36,9 @@ void host_decide_rows(const rcbf_constants_t *constants, const rcbf_input_t *inp
 /* Feeds `frames_a_period` frames before each step; returns how many frames the ECU sent. */
 uint32_t host_run_periods(bms_t *bms, const can_frame_t *received, uint32_t frames_a_period,
                           uint32_t periods, float *command_A);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

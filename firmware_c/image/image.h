@@ -8,6 +8,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define IMAGE_MAGIC_APPLICATION 0x50414D42u /* the text BMAP */
 #define IMAGE_MAGIC_CALIBRATION 0x41434D42u /* the text BMCA */
 
@@ -67,5 +71,9 @@ image_status_t image_check_application(const image_memory_t *place, uint32_t tar
 /* Whether an application that has been checked may use the calibration. */
 image_status_t image_check_calibration(const image_memory_t *place,
                                        const image_header_t *application);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

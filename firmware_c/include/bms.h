@@ -20,6 +20,10 @@
 #include "soc.h"
 #include "thermal.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define BMS_FIRMWARE_VERSION 2
 #define BMS_TRANSMITTED_MESSAGES 7
 
@@ -71,5 +75,9 @@ void bms_step(bms_t *bms);
 
 /* Pops the next frame to send; the charge command is the last one of a period. */
 bool bms_transmit(bms_t *bms, can_frame_t *frame);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -9,6 +9,10 @@
 #include "rcbf.h"
 #include "thermal.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Raised whenever the layout of bms_calibration_t or of one of its parts changes. */
 #define BMS_CALIBRATION_LAYOUT 3
 
@@ -50,5 +54,9 @@ bool calibration_is_valid(const bms_calibration_t *calibration);
 
 /* The calibration that is compiled in; generated/calibration_default.c. */
 extern const bms_calibration_t BMS_DEFAULT_CALIBRATION;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

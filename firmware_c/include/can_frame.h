@@ -4,10 +4,18 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     uint32_t id;
     uint8_t length;
     uint8_t data[8];
 } can_frame_t;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -12,6 +12,10 @@
 #include "can_frame.h"
 #include "e2e.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     float scale;
     float offset;
@@ -77,5 +81,9 @@ void codec_read(uint32_t index, const uint8_t *data, codec_measurement_t *measur
 
 /* Fills transmitted message `index` (order of CAN_TRANSMITTED), without its protection. */
 void codec_write(uint32_t index, const codec_report_t *report, can_frame_t *frame);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -10,6 +10,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define E2E_COUNTERS 16
 #define E2E_HEADER_LENGTH 2
 #define E2E_LONGEST_WINDOW 8
@@ -84,5 +88,9 @@ e2e_status_t e2e_check(e2e_receiver_t *receiver, const uint8_t *data, uint8_t le
 
 /* Ends a period: moves the state and forgets what came. */
 e2e_verdict_t e2e_supervise(e2e_receiver_t *receiver, const e2e_policy_t *policy);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

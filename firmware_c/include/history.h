@@ -7,6 +7,10 @@
 
 #include "kan.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Periods without usable readings that the filters bridge with the last ones. */
 #define HISTORY_MAX_BRIDGED 3
 
@@ -34,5 +38,9 @@ bool history_is_settling(const history_t *history, const kan_model_t *model);
  * must be valid and have these four inputs and its lags. in_domain is false until settled. */
 kan_estimate_t history_estimate(const history_t *history, const kan_model_t *model,
                                 const float *measured);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -9,6 +9,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define KAN_MAX_LAYERS 3
 #define KAN_MAX_WIDTH 8 /* nodes of a layer, inputs too */
 #define KAN_MAX_KNOTS 128
@@ -71,5 +75,9 @@ float kan_edge_value(const kan_model_t *model, uint32_t edge, float x, bool *in_
 /* Estimate for width[0] inputs. Inputs outside the trained box or the directions' slabs (or not
  * finite) clear in_domain; beyond input_reach they are clamped. The model must be valid. */
 kan_estimate_t kan_evaluate(const kan_model_t *model, const float *inputs);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -9,6 +9,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum {
     FAULT_ELECTRICAL_MISSING = 0, /* no usable CellElectrical message */
     FAULT_THERMAL_MISSING = 1, /* no usable CellThermal message */
@@ -57,5 +61,9 @@ bool monitor_stops(uint32_t symptoms);
 
 /* Takes the symptoms of one period, bit n for fault n. */
 void monitor_step(monitor_t *monitor, uint32_t symptoms);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -9,6 +9,10 @@
 #include "codec.h"
 #include "e2e.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define NETWORK_MESSAGES 4
 
 /* Index: order of CAN_RECEIVED. All zero before the first frame. */
@@ -27,5 +31,9 @@ void network_step(network_t *network);
 
 /* Whether every message has come often enough to be trusted. */
 bool network_is_valid(const network_t *network);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

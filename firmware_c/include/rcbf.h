@@ -10,6 +10,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define RCBF_MAX_OCV_POINTS 64
 #define RCBF_CONSTRAINTS 4
 
@@ -91,5 +95,9 @@ float rcbf_open_circuit_voltage_V(const rcbf_constants_t *constants, float soc);
  * (RCBF_INFEASIBLE) or an input is not finite, out of any physical range, or the reference is
  * above 0 A (RCBF_INVALID). */
 rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t *input);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -5,6 +5,10 @@
 #ifndef SOC_H
 #define SOC_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     float soc;
     float lost; /* low-order part that did not fit into soc */
@@ -21,5 +25,9 @@ void soc_set(soc_t *state, float soc);
 /* Counts one period of constant currents (negative while charging). */
 void soc_count(soc_t *state, float measured_A, float commanded_A, float period_s,
                float capacity_As);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -7,6 +7,10 @@
 
 #include <stdbool.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* For one period: rise <- transition rise + gain_K_per_W heat + gain_coolant (coolant - start);
  * index 0 is the core, 1 the surface, temperatures are above that of the surface at the start. */
 typedef struct {
@@ -36,5 +40,9 @@ void thermal_step(thermal_t *thermal, const thermal_constants_t *constants, floa
 
 /* Coldest that the surface can be; far below any reading before the first step. */
 float thermal_coldest_surface_K(const thermal_t *thermal, const thermal_constants_t *constants);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
