@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
+from bms.commands import options
 from bms.image import calibration_part
 from bms.model.model_file import load_model, load_shipped_model
 from bms.presets import DEFAULT_PRESET, load_preset
@@ -18,13 +17,11 @@ CALIBRATION_FILE = "calibration.bin"
 
 
 def export(
-    out: Annotated[Path, typer.Option(help="Folder for the C sources; created when absent.")],
-    preset: Annotated[
-        str, typer.Option(help="Preset by name, or path of a .toml file.")
-    ] = DEFAULT_PRESET,
-    model: Annotated[
-        Path | None, typer.Option(help="Model JSON of 'bms train'. Default: the preset's own.")
-    ] = None,
+    out: Annotated[
+        Path, options.out_folder_option("the C sources and calibration.bin", default=None)
+    ],
+    preset: options.PresetOption = DEFAULT_PRESET,
+    model: options.ModelOption = None,
 ) -> None:
     """Write what the firmware takes from a model: generated C sources and a calibration part.
 

@@ -18,7 +18,8 @@ from bms.bounds.chart import write_chart
 from bms.bounds.conformal import CONFIDENCE
 from bms.bounds.derive import bounds_for_preset, bounds_for_recording, error_bound_parts_K
 from bms.bounds.record import ErrorBounds
-from bms.commands.options import DataOption
+from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands import options
 from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
 from bms.data.simulate import joined
@@ -29,27 +30,26 @@ from bms.model.model_file import KanModel, load_model
 from bms.model.pair import check_pair
 from bms.presets import load_preset
 
-LARGE_ENOUGH, TOO_SMALL = 0, 1
 _ROUND_OFF = 1e-9
 
 Found = tuple[ErrorBounds, dict[str, float], str]
 
 
 def bound(
-    model: Annotated[Path, typer.Option("--model", help="Model (JSON).")],
+    model: options.RequiredModelOption,
     preset: Annotated[
-        str | None,
-        typer.Option("--preset", help="Preset to search; none: the one of the model."),
+        str | None, options.preset_option("Preset to search", "the one of the model")
     ] = None,
-    data: DataOption = None,
-    seed: Annotated[
-        int | None, typer.Option("--seed", min=0, help="Of the search; none: that of the training.")
-    ] = None,
+    data: options.DataOption = None,
+    seed: Annotated[int | None, options.seed_option("the search", "that of the training")] = None,
     confidence: Annotated[
-        float, typer.Option("--confidence", min=0.01, max=0.999, help="Of the conformal bound.")
+        float,
+        typer.Option(
+            "--confidence", min=0.01, max=0.999, help="Confidence of the conformal bound."
+        ),
     ] = CONFIDENCE,
-    out: Annotated[Path | None, typer.Option("--out", help="Folder for plot and JSON.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    out: Annotated[Path | None, options.out_folder_option("bound.json and bound.png")] = None,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Derive the bounds (K) on the error of the estimate anew and compare with the model's own.
 
@@ -76,7 +76,7 @@ def bound(
         typer.echo(json.dumps(result, indent=1))
     else:
         _print(str(model), found[0], result)
-    return LARGE_ENOUGH if result["holds"] else TOO_SMALL
+    return EXIT_DONE if result["holds"] else EXIT_CHECK_FAILED
 
 
 def _from_preset(model: KanModel, name: str, seed: int, confidence: float) -> Found:

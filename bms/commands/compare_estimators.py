@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from bms.commands.options import DataOption
+from bms.commands import options
 from bms.errors import InputError
 from bms.files import write_text
 from bms.kan.network import INPUT_NAMES
@@ -30,20 +30,18 @@ _TABLE_WIDTH = 140
 
 
 def compare_estimators(
-    preset: Annotated[
-        str | None, typer.Option("--preset", help="Simulate the data from it: name or .toml file.")
-    ] = None,
-    data: DataOption = None,
+    preset: options.SimulatedPresetOption = None,
+    data: options.DataOption = None,
     model: Annotated[
         list[Path] | None,
-        typer.Option("--model", help="Network to compare (JSON), besides the preset's own."),
+        options.model_option("Model to compare beside the preset's own", repeated=True),
     ] = None,
     cell: Annotated[
         str | None,
-        typer.Option(
-            "--cell",
-            help="With --data: preset (name or .toml) whose cell the filters take as it is; "
-            f"none: that of {DEFAULT_CELL}, fitted to the first two thirds.",
+        options.preset_option(
+            "With --data, preset whose cell the filters take as it is",
+            f"that of {DEFAULT_CELL}, fitted to the first two thirds",
+            name="--cell",
         ),
     ] = None,
     profiles: Annotated[
@@ -51,15 +49,15 @@ def compare_estimators(
         typer.Option("--profiles", min=1, help="With --preset: profiles of each kind and split."),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option("--seed", min=0, help="Of data and fits; none: the network's.")
+        int | None, options.seed_option("data and fits", "that of the training")
     ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Fit MLP and floor for a moment only: a first look.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for estimators.json and estimators.png.")
+        Path | None, options.out_folder_option("estimators.json and estimators.png")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Compare the KAN with its rivals: error (K), size, work and time of an estimate in float32 C.
 

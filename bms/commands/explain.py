@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bms.arrays import Array
-from bms.commands.options import DataOption
+from bms.commands import options
 from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
 from bms.data.simulate import joined
@@ -28,13 +28,16 @@ _DPI = 110
 
 
 def explain(
-    model: Annotated[Path, typer.Option("--model", help="Model to explain (JSON).")],
-    out: Annotated[Path, typer.Option("--out", help="Folder for plots, formulas and JSON.")],
-    data: DataOption = None,
+    model: options.RequiredModelOption,
+    out: Annotated[
+        Path, options.out_folder_option("plots, formulas and explanation.json", default=None)
+    ],
+    data: options.DataOption = None,
     preset: Annotated[
-        str | None, typer.Option("--preset", help="Simulate the data from it: name or .toml file.")
+        str | None,
+        options.preset_option("Preset to simulate the data from", "the one of the model"),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show the edge functions of a model, formulas for them, and its sensitivities.
 

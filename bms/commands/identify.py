@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from bms.commands.options import DataOption
+from bms.commands import options
 from bms.data.measurements import read_measurements
 from bms.errors import InputError
 from bms.files import write_text
@@ -26,14 +26,15 @@ _DIGITS = 6
 
 
 def identify(
-    data: DataOption,
+    data: options.DataOption,
     preset: Annotated[
-        str, typer.Option("--preset", help="Start, and values that the data do not identify.")
+        str,
+        options.preset_option("Preset to start from, and for what the data do not identify"),
     ] = "lin2014",
     out: Annotated[
         Path | None, typer.Option("--out", help="Preset with the fitted cell to write (.toml).")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Fit a cell's thermal parameters to measured core and surface temperature (K).
 

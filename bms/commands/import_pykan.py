@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from bms.commands.options import DataOption
+from bms.commands import options
 from bms.errors import InputError
 from bms.kan.network import INPUT_NAMES
 from bms.model.model_file import KanModel, save_model
@@ -25,11 +25,12 @@ def import_pykan(
     checkpoint: Annotated[
         Path, typer.Argument(help="What saveckpt was given: PATH of PATH_config.yml, PATH_state.")
     ],
-    out: Annotated[Path, typer.Option("--out", help="Model to write (JSON).")],
+    out: options.ModelOutOption,
     preset: Annotated[
-        str, typer.Option("--preset", help="Its box is the default scaling, its profiles the test.")
+        str,
+        options.preset_option("Preset for the default scaling (its box) and the test profiles"),
     ] = DEFAULT_PRESET,
-    data: DataOption = None,
+    data: options.DataOption = None,
     center: Annotated[
         str | None, typer.Option("--center", help="Middle of each input (A, W, K, K), as a,b,c,d.")
     ] = None,
@@ -43,7 +44,7 @@ def import_pykan(
     output_half_range_K: Annotated[
         float, typer.Option("--output-half-range", help="Kelvin for each 1 of pykan's output.")
     ] = 1.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Import a network that pykan has trained on inputs scaled to -1..1, and test it.
 

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from bms.commands.options import DataOption
+from bms.commands import options
 from bms.errors import InputError
 from bms.kan.network import INPUT_NAMES
 from bms.kan.settings import TrainingSettings
@@ -28,12 +28,10 @@ _Number = TypeVar("_Number", int, float)
 
 
 def train(
-    out: Annotated[Path, typer.Option("--out", help="Model to write (JSON).")],
-    preset: Annotated[
-        str | None, typer.Option("--preset", help="Simulate the data from it: name or .toml file.")
-    ] = None,
-    data: DataOption = None,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of data and training.")] = DEFAULTS.seed,
+    out: options.ModelOutOption,
+    preset: options.SimulatedPresetOption = None,
+    data: options.DataOption = None,
+    seed: Annotated[int, options.seed_option("data and training")] = DEFAULTS.seed,
     lagged: Annotated[
         bool,
         typer.Option("--lagged", help="Add low-pass filtered current squared and surface rise."),

@@ -4,34 +4,29 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
+from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands import options
 from bms.presets import DEFAULT_PRESET
 from bms.verification import CLASHING_DELTA4, SLIPS, Formulas, Verification, slips_of
 from bms.verification.search import CounterExample
 
-CERTIFIED, NOT_CERTIFIED = 0, 1
-
 
 def verify(
-    preset: Annotated[
-        str, typer.Option("--preset", help="Preset by name or TOML file.")
-    ] = DEFAULT_PRESET,
-    model: Annotated[
-        Path | None, typer.Option("--model", help="Model (JSON); none: the preset's own.")
-    ] = None,
+    preset: options.PresetOption = DEFAULT_PRESET,
+    model: options.ModelOption = None,
     formulas: Annotated[
         Formulas, typer.Option("--formulas", help="paper: with the slips of the printed formulas.")
     ] = Formulas.CORRECTED,
     slips: Annotated[
         bool, typer.Option("--slips", help="Also charge with each slip and show what it costs.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Certify that no decision lets a limit be crossed before the next decision acts.
 
@@ -77,7 +72,7 @@ def verify(
                     f"{cost.surface_peak_K:.3f}",
                 )
             Console().print(table)
-    return CERTIFIED if result.certified else NOT_CERTIFIED
+    return EXIT_DONE if result.certified else EXIT_CHECK_FAILED
 
 
 def _print(result: Verification) -> None:
