@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 from annotated_types import Ge, Le, Len
-from bms.firmware._firmware import ffi
 
 from bms.errors import InputError
+from bms.firmware._firmware import ffi
 from bms.validation import Positive, parse, read_toml, strict
 from hil_sim.bus.database import MessageCodec, load_database
 from hil_sim.faults.base import Fault
