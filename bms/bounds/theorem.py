@@ -96,7 +96,7 @@ def _normalised(network: Network, data: Samples, rows: IntArray) -> Points:
 
 def _own_grid(network: Network) -> int:
     """Intervals of the network's finest edge."""
-    knots = max(len(edge.knots) for layer in network.layers for row in layer for edge in row)
+    knots = max(len(edge.knots) for edge in network.edges)
     return knots - 1 - 2 * network.degree
 
 

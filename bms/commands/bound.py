@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from dataclasses import asdict
@@ -20,12 +19,11 @@ from bms.bounds.derive import bounds_for_preset, bounds_for_recording, error_bou
 from bms.bounds.record import ErrorBounds
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands import options
-from bms.data.datasets import simulated_split
-from bms.data.measurements import read_measurements
+from bms.data.datasets import simulated_split, split_by_time
+from bms.data.measurements import read_measurements, recording_sha256
 from bms.data.simulate import joined
 from bms.errors import InputError
-from bms.files import write_text
-from bms.model.make import split_by_time
+from bms.files import make_folder, write_text
 from bms.model.model_file import KanModel, load_model
 from bms.model.pair import check_pair
 from bms.presets import load_preset
@@ -94,8 +92,7 @@ def _from_preset(model: KanModel, name: str, seed: int, confidence: float) -> Fo
 
 def _from_recording(model: KanModel, path: Path, seed: int, confidence: float) -> Found:
     recording = read_measurements(path).samples(model.network.lags)
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    if digest == model.training.data_sha256:
+    if recording_sha256(path) == model.training.data_sha256:
         training, held_out = split_by_time(recording)
         source = f"{path.name}, last third"
     else:
@@ -122,10 +119,7 @@ def _result(
 
 
 def _write(folder: Path, bounds: ErrorBounds, result: dict[str, Any]) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made ({error.strerror}); choose another") from None
+    make_folder(folder)
     write_chart(bounds.theorem, folder / "bound.png")
     write_text(folder / "bound.json", json.dumps(result, indent=1) + "\n")
 

@@ -19,6 +19,7 @@ from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
 from bms.data.simulate import Samples, joined
 from bms.errors import InputError
+from bms.firmware import CompiledNetwork
 from bms.kan.accuracy import error_figures
 from bms.model.model_file import KanModel, load_model
 from bms.model.pair import check_pair
@@ -77,8 +78,5 @@ def _estimate(
 ) -> tuple[Array, Mask]:
     if engine is Engine.PYTHON:
         return model.network.evaluate(samples.inputs)
-    # Imported here, so that the Python engine works where the firmware is not compiled.
-    from bms.firmware import CompiledNetwork  # noqa: PLC0415
-
     compiled = CompiledNetwork(model)
     return compiled.follow(samples) if is_recording else compiled.evaluate(samples.inputs)

@@ -21,6 +21,10 @@ from bms.files import write_text
 from bms.kan.network import INPUT_NAMES
 from bms.model.model_file import KanModel, load_model
 from bms.presets import load_preset
+from bms.studies.explanation import explain as explained
+from bms.studies.explanation.plots import layer_figure, sensitivity_figure
+from bms.studies.explanation.report import Subject, as_latex, as_text
+from bms.studies.explanation.report import as_json as as_content
 
 _PROFILES = 30
 _UNIFORM_POINTS = 20000
@@ -47,12 +51,6 @@ def explain(
 
     Example: bms explain --model model.json --out out/explain
     """
-    # Imported here, so that the other commands start without Matplotlib's seconds.
-    from bms.studies.explanation import explain as explained  # noqa: PLC0415
-    from bms.studies.explanation.plots import layer_figure, sensitivity_figure  # noqa: PLC0415
-    from bms.studies.explanation.report import Subject, as_latex, as_text  # noqa: PLC0415
-    from bms.studies.explanation.report import as_json as as_content  # noqa: PLC0415
-
     loaded = load_model(model)
     inputs, source = _inputs(loaded, data, preset)
     result = explained(loaded.network, inputs)

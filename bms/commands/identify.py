@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -13,15 +13,15 @@ from rich.markup import escape
 from rich.table import Table
 
 from bms.commands import options
+from bms.data.datasets import training_rows
 from bms.data.measurements import read_measurements
 from bms.errors import InputError
 from bms.files import write_text
+from bms.identification import Identification
+from bms.identification import identify as identified
+from bms.identification.preset_toml import preset_toml
 from bms.presets import Preset, load_preset
 
-if TYPE_CHECKING:
-    from bms.identification import Identification
-
-_FITTED_SHARE = 2.0 / 3.0
 _DIGITS = 6
 
 
@@ -43,18 +43,15 @@ def identify(
 
     Example: bms identify --data cycle.csv --preset lin2014 --out my_cell.toml
     """
-    from bms.identification import identify as fit  # noqa: PLC0415  (SciPy's optimisers load slowly)
-    from bms.identification.preset_toml import preset_toml  # noqa: PLC0415
-
     if data is None:
         raise InputError("identify: give --data CSV")
     if out is not None and out.suffix != ".toml":
         raise InputError(f"--out {out}: a preset is a file with the ending .toml; change the name")
     start = load_preset(preset)
     recording = read_measurements(data)
-    cut = round(_FITTED_SHARE * len(recording.time_s))
+    cut = training_rows(len(recording.time_s))
     try:
-        result = fit(recording, start, slice(0, cut))
+        result = identified(recording, start, slice(0, cut))
     except InputError as error:
         raise InputError(f"{data}: {error}") from None
     if out is not None:

@@ -16,8 +16,10 @@ from rich.table import Table
 from bms.commands import options
 from bms.errors import InputError
 from bms.kan.network import INPUT_NAMES
+from bms.kan.scaling import Scaling
 from bms.model.model_file import KanModel, save_model
 from bms.presets import DEFAULT_PRESET, Preset, load_preset
+from bms.pykan_import import imported_model, imported_network, read_checkpoint
 from bms.tables import network_tables
 
 
@@ -55,10 +57,6 @@ def import_pykan(
 
     Example: bms import-pykan model/0.1 --out model.json --output-center 300 --output-half-range 20
     """
-    # Imported here, so that the other commands start without SciPy's and PyTorch's seconds.
-    from bms.kan.scaling import Scaling  # noqa: PLC0415
-    from bms.pykan_import import imported_model, imported_network, read_checkpoint  # noqa: PLC0415
-
     chosen = load_preset(preset)
     if not output_half_range_K > 0.0:
         raise InputError("--output-half-range: must be above 0")

@@ -12,8 +12,11 @@ from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands import options
+from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
 from bms.verification import CLASHING_DELTA4, SLIPS, Formulas, Verification, slips_of
+from bms.verification import verify as certify
+from bms.verification.closed_loop import HORIZON_S, SlipCost, slip_cost
 from bms.verification.search import CounterExample
 
 
@@ -36,11 +39,6 @@ def verify(
 
     Example: bms verify --preset lin2014 --json
     """
-    # Imported here, so that the other commands start where the firmware is not compiled.
-    from bms.model.pair import load_pair  # noqa: PLC0415
-    from bms.verification.closed_loop import slip_cost  # noqa: PLC0415
-    from bms.verification.verify import verify as certify  # noqa: PLC0415
-
     pair = load_pair(preset, model)
     result = certify(*pair, slips_of(formulas))
     costs = []
@@ -55,23 +53,7 @@ def verify(
     else:
         _print(result)
         if costs:
-            table = Table(
-                "slip", "certified", "core excess K", "surface excess K", "voltage excess V",
-                "charge s", "core peak K", "surface peak K",
-            )  # fmt: skip
-            for cost in costs:
-                time_s = cost.charge_time_s
-                table.add_row(
-                    cost.slip,
-                    "yes" if cost.certified else "no",
-                    f"{cost.core_excess_K:+.5f}",
-                    f"{cost.surface_excess_K:+.5f}",
-                    f"{cost.voltage_excess_V:+.5f}",
-                    f"{time_s:.1f}" if time_s is not None else f"soc {cost.soc:.2f} in 1800 s",
-                    f"{cost.core_peak_K:.3f}",
-                    f"{cost.surface_peak_K:.3f}",
-                )
-            Console().print(table)
+            _print_costs(costs)
     return EXIT_DONE if result.certified else EXIT_CHECK_FAILED
 
 
@@ -126,6 +108,26 @@ def _print(result: Verification) -> None:
         f"{result.preset} ({formulas}): {verdict} for {result.held_s:g} s from each reading, "
         f"{result.wall_time_s:.1f} s"
     )
+
+
+def _print_costs(costs: list[SlipCost]) -> None:
+    table = Table(
+        "slip", "certified", "core excess K", "surface excess K", "voltage excess V",
+        "charge s", "core peak K", "surface peak K",
+    )  # fmt: skip
+    for cost in costs:
+        time_s = cost.charge_time_s
+        table.add_row(
+            cost.slip,
+            "yes" if cost.certified else "no",
+            f"{cost.core_excess_K:+.5f}",
+            f"{cost.surface_excess_K:+.5f}",
+            f"{cost.voltage_excess_V:+.5f}",
+            f"{time_s:.1f}" if time_s is not None else f"soc {cost.soc:.2f} in {HORIZON_S:g} s",
+            f"{cost.core_peak_K:.3f}",
+            f"{cost.surface_peak_K:.3f}",
+        )
+    Console().print(table)
 
 
 def _example(example: CounterExample | None) -> str:

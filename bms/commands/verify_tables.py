@@ -15,6 +15,7 @@ from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands import options
 from bms.errors import InputError
 from bms.model.model_file import KanModel, load_model, shipped_models
+from bms.verification.exhaustive import EdgeCheck, check_network
 
 _STRIDE = 8191
 
@@ -39,9 +40,6 @@ def verify_tables(
 
     Example: bms verify-tables --model model.json --stride 1
     """
-    # Imported here, so that the other commands start where the firmware is not compiled.
-    from bms.verification.exhaustive import EdgeCheck, check_network  # noqa: PLC0415
-
     paths = list(model) if model else shipped_models()
     models = {str(path): _bounded(load_model(path), path) for path in paths}
     rows: list[dict[str, Any]] = []
@@ -72,7 +70,7 @@ def _bounded(model: KanModel, path: Path) -> KanModel:
     return model
 
 
-def _row(name: str, model: KanModel, check: Any) -> dict[str, Any]:
+def _row(name: str, model: KanModel, check: EdgeCheck) -> dict[str, Any]:
     bound = model.edge_error_bounds[check.edge]
     return {
         "model": name,

@@ -1,4 +1,4 @@
-"""Whether a target may be given an image: by the code that its boot stage runs, and then some."""
+"""Checks of an image for a target: those of its boot stage, in the same C code, and a few more."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ def check_image(image: bytes, target: str, origin: str) -> None:
 
 
 def check_application(image: bytes, target: str, origin: str) -> None:
-    """As check_image, whatever stands in the place of the calibration."""
+    """Raise InputError, naming the origin, unless boot stage and application fit the target.
+
+    What stands in the place of the calibration is not looked at.
+    """
     boot, application = MEMORY_MAP.boot, MEMORY_MAP.application
     if len(image) < application.end:
         raise InputError(

@@ -106,6 +106,11 @@ class Network:
         """Number of nodes of the input and of each layer, such as (4, 1, 1)."""
         return (len(self.input_names), *(len(layer) for layer in self.layers))
 
+    @property
+    def edges(self) -> list[Edge]:
+        """All edges in the firmware's order: layer by layer, output by output, input by input."""
+        return [edge for layer in self.layers for row in layer for edge in row]
+
     def evaluate(self, inputs: Array) -> tuple[Array, Mask]:
         """Core temperature in K and whether it can be trusted (bool), both (N,).
 
