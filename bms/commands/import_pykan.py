@@ -107,13 +107,13 @@ def _box(preset: Preset, inputs: int) -> tuple[list[float], list[float]]:
 
 
 def _numbers(option: str, text: str) -> list[float]:
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = [math.nan]
-    if not all(math.isfinite(value) for value in values):
-        raise InputError(f"{option}: '{text}' is not a list of numbers such as -12,1,300,295")
-    return values
+    return options.number_list(option, text, _finite, "-12,1,300,295")
+
+
+def _finite(text: str) -> float:
+    if not math.isfinite(value := float(text)):
+        raise ValueError
+    return value
 
 
 def _result(model: KanModel) -> dict[str, Any]:

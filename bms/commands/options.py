@@ -1,4 +1,4 @@
-"""Options that several commands share: one name, one meaning, one help text.
+"""Options that several commands share: one name, one meaning, one help text, one reading.
 
 What means the same in every command is an annotated type. What has a role of its own in a command
 is a function that takes this role and says the rest as everywhere.
@@ -7,10 +7,15 @@ is a function that takes this role and says the rest as everywhere.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import typer
+
+from bms.errors import InputError
+
+N = TypeVar("N", int, float)
 
 DEFAULT_PROCESSES = os.cpu_count() or 1
 
@@ -43,6 +48,14 @@ def processes_option(name: str) -> Any:
     return typer.Option(
         name, min=1, show_default=False, help="Processes on this machine. Default: one a core."
     )
+
+
+def number_list(option: str, text: str, number: Callable[[str], N], example: str) -> list[N]:
+    """Numbers of a value such as 4,1,1; InputError when `number` raises ValueError for one."""
+    try:
+        return [number(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"{option}: '{text}' is not a list of numbers such as {example}") from None
 
 
 def _said(default: str | None) -> str:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -22,9 +21,9 @@ from bms.presets import load_preset
 from bms.validation import parse
 
 DEFAULTS = TrainingSettings()
+_LIST_EXAMPLE = "4,1,1"
 _LAGS_OF_PRESETS_S = (3.0,)
 _LAGS_OF_RECORDINGS_S = (10.0, 160.0)
-_Number = TypeVar("_Number", int, float)
 
 
 def train(
@@ -69,13 +68,18 @@ def train(
         raise InputError("train: give either --preset NAME or --data CSV")
     constants_s: list[float] = []
     if lag_time_constants_s is not None:
-        constants_s = _numbers(lag_time_constants_s, "--lag-time-constants", float)
+        constants_s = options.number_list(
+            "--lag-time-constants", lag_time_constants_s, float, _LIST_EXAMPLE
+        )
     elif lagged:
         constants_s = list(_LAGS_OF_PRESETS_S if data is None else _LAGS_OF_RECORDINGS_S)
     inputs = len(INPUT_NAMES) + 2 * len(constants_s)
+    nodes = [inputs, 1, 1]
+    if width is not None:
+        nodes = options.number_list("--width", width, int, _LIST_EXAMPLE)
     settings = _settings(
         seed=seed,
-        width=[inputs, 1, 1] if width is None else _numbers(width, "--width", int),
+        width=nodes,
         lag_time_constants_s=constants_s,
         grid=grid,
         degree=degree,
@@ -102,13 +106,6 @@ def train(
 
 def _settings(**values: object) -> TrainingSettings:
     return parse(TrainingSettings, values, "train")
-
-
-def _numbers(text: str, option: str, kind: Callable[[str], _Number]) -> list[_Number]:
-    try:
-        return [kind(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"{option}: '{text}' is not a list of numbers such as 4,1,1") from None
 
 
 def _require_writable(out: Path) -> None:

@@ -22,6 +22,9 @@ def calibration_hashes(content: bytes) -> tuple[int, int]:
 
     Raises ValueError for fewer bytes than a block has.
     """
+    size = ffi.sizeof("bms_calibration_t")
+    if len(content) < size:
+        raise ValueError(f"a calibration block has {size} bytes, not {len(content)}")
     block = ffi.from_buffer("bms_calibration_t *", content)
     return block.model_hash, block.preset_hash
 

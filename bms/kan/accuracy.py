@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
-from annotated_types import Ge
 
 from bms.arrays import Array
-from bms.validation import Finite, NonNegative, strict
+from bms.validation import Count, Finite, NonNegative, strict
 
 
 @strict
@@ -20,7 +18,7 @@ class ErrorFigures:
     rmse_K: NonNegative
     max_abs_error_K: NonNegative
     bias_K: Finite
-    samples: Annotated[int, Ge(1)]
+    samples: Count
 
 
 def error_figures(estimate_K: Array, truth_K: Array) -> ErrorFigures:

@@ -13,7 +13,7 @@ from bms.data.lags import Lags
 from bms.errors import InputError
 from bms.kan.basis import basis, silu
 from bms.kan.domain import EVERYWHERE, Domain
-from bms.validation import Finite, Positive, strict
+from bms.validation import Count, Finite, Positive, strict
 
 INPUT_NAMES = (
     "current_A",
@@ -61,7 +61,7 @@ class Network:
     Raises InputError when shapes do not fit together or knots do not rise.
     """
 
-    degree: Annotated[int, Ge(1)]
+    degree: Count
     input_names: tuple[str, ...]
     input_center: tuple[Finite, ...]
     input_half_range: tuple[Positive, ...]

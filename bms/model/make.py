@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -25,12 +25,10 @@ from bms.kan.measured import train_on_recording
 from bms.kan.network import Network
 from bms.kan.scaling import Ranges
 from bms.kan.settings import TrainingSettings
-from bms.kan.training import train_network
+from bms.kan.training import Progress, train_network
 from bms.model.model_file import FORMAT_VERSION, KanModel, SplitErrors, TrainingRecord
 from bms.presets import Preset
 from bms.tables.rounding import edge_error_bounds, fits_firmware
-
-Progress = Callable[[float], None]
 
 _BOX_MARGIN = 0.1
 _SMALLEST_HALF_RANGE = 0.5
