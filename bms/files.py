@@ -1,4 +1,4 @@
-"""Writing of single files, at once or not at all."""
+"""Writing of single files, at once or not at all, and the folders that they go to."""
 
 from __future__ import annotations
 
@@ -7,6 +7,16 @@ import tempfile
 from pathlib import Path
 
 from bms.errors import InputError
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder and its parents unless it is there; InputError when that cannot be done."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be made ({error.strerror}); choose another folder"
+        ) from None
 
 
 def write_text(path: Path, text: str) -> None:

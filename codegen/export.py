@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bms.commands import options
 from bms.errors import InputError
 from bms.image import calibration_part
 from bms.model.model_file import load_model, load_shipped_model
@@ -22,9 +23,7 @@ CALIBRATION_FILE = "calibration.bin"
 def export(
     out: Annotated[
         Path | None,
-        typer.Option(
-            help="Folder for the generated C sources and calibration.bin; created when absent."
-        ),
+        options.out_folder_option("the generated C sources and calibration.bin", default=None),
     ] = None,
     sources: Annotated[
         Path | None,
@@ -32,12 +31,8 @@ def export(
             help="Folder for the whole C core, to be built by CMake; created when absent."
         ),
     ] = None,
-    preset: Annotated[
-        str, typer.Option(help="Preset by name, or path of a .toml file.")
-    ] = DEFAULT_PRESET,
-    model: Annotated[
-        Path | None, typer.Option(help="Model JSON of 'bms train'. Default: the preset's own.")
-    ] = None,
+    preset: options.PresetOption = DEFAULT_PRESET,
+    model: options.ModelOption = None,
 ) -> None:
     """Write what the firmware takes from a model, or the C core with it for a project of your own.
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator, ScalarFormatter
 
 from bms.bounds.record import TheoremBound
 from bms.errors import InputError
@@ -16,11 +17,8 @@ def write_chart(theorem: TheoremBound, path: Path) -> None:
 
     InputError when the file cannot be written.
     """
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt  # noqa: PLC0415
-    from matplotlib.ticker import NullLocator, ScalarFormatter  # noqa: PLC0415
-
-    figure, axes = plt.subplots(figsize=(7.2, 4.6), layout="constrained")
+    figure = Figure(figsize=(7.2, 4.6), layout="constrained")
+    axes = figure.subplots()
     axes.loglog(theorem.grids, theorem.largest_K, "o-", color="C0", label="largest, data and box")
     axes.loglog(theorem.grids, theorem.rms_K, "s-", color="C2", label="RMS, data")
     rate = theorem.rate
@@ -64,5 +62,3 @@ def write_chart(theorem: TheoremBound, path: Path) -> None:
         figure.savefig(path, dpi=130, metadata={"Software": None})
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from None
-    finally:
-        plt.close(figure)

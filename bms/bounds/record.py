@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from annotated_types import Ge, Gt, Lt
+from annotated_types import Gt, Lt
 
-from bms.validation import Finite, NonNegative, strict
+from bms.validation import Count, Finite, NonNegative, strict
 
 Method = Literal["worst_case", "held_out", "conformal"]
-Count = Annotated[int, Ge(1)]
 
 
 @strict

@@ -13,9 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
-from bms.arrays import Array
+from bms.arrays import Array, IntArray
 from bms.bounds.fitting import Layers, Points, fitted
 from bms.bounds.rate import fit_rate
 from bms.bounds.record import TheoremBound
@@ -88,7 +87,7 @@ def _record(
     )
 
 
-def _normalised(network: Network, data: Samples, rows: npt.NDArray[np.int64]) -> Points:
+def _normalised(network: Network, data: Samples, rows: IntArray) -> Points:
     center, half_range = np.asarray(network.input_center), np.asarray(network.input_half_range)
     x = np.ascontiguousarray(((data.inputs[rows] - center) / half_range).T)
     core_K = data.core_temperature_K[rows]
@@ -97,7 +96,7 @@ def _normalised(network: Network, data: Samples, rows: npt.NDArray[np.int64]) ->
 
 def _own_grid(network: Network) -> int:
     """Intervals of the network's finest edge."""
-    knots = max(len(edge.knots) for layer in network.layers for row in layer for edge in row)
+    knots = max(len(edge.knots) for edge in network.edges)
     return knots - 1 - 2 * network.degree
 
 

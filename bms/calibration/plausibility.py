@@ -1,4 +1,10 @@
-"""What readings the firmware believes, and how far they may be from what it expects of them."""
+"""What readings the firmware believes, and how far they may be from what it expects of them.
+
+The thresholds are the same for every preset. Each is many times what sensors, bus and model can err
+by, so that none is crossed in a charge within the modelled uncertainty, and small enough to find
+the faults of docs/faults.md. Figures below are those of the shipped presets: 10C is 23 A, and the
+bounds of a reading's error, sensor and bus together, are 0.024 A, 2.3 mV, 0.028 K and 0.011 W.
+"""
 
 from __future__ import annotations
 
@@ -6,33 +12,47 @@ from typing import Any
 
 from bms.presets import Preset
 
-# Beyond these no sensor of a cell reads: an electrolyte is frozen below -50 degC and gone above
-# 100 degC, and no plate cools a single cell with 40 W. Less than no cooling is the sensor's error.
 _SENSOR_RANGES = {
+    # -50 to 100 degC, nearly 50 K beyond the operating boxes (272 to 326 K) on either side. A
+    # sensor whose wire is open or shorted reads the end of its own range.
     "surface_temperature_K": (223.0, 373.0),
     "coolant_temperature_K": (223.0, 373.0),
+    # All the heat of a cell at 10C is 6 to 7 W (R0 u^2), and the operating boxes end at 3 W. Less
+    # than no cooling can only be the sensor's error.
     "cooling_power_W": (-1.0, 40.0),
 }
 
-# A charger gives at most what is asked for; half as much again is a broken sensor.
+# A charger gives at most what is asked for, and out of a charge a load may draw current; half as
+# much again as the reference current is neither.
 _CURRENT_RANGE_FACTOR = 1.5
 
-# Below 1.5 V a lithium cell is damaged and must not be charged. What is above the limit is
-# over-voltage, a fault of its own, up to where no cell but a broken wire explains it.
-_LOWEST_VOLTAGE_V, _VOLTAGE_HEADROOM_V = 1.5, 0.6
+# The open-circuit curve of an empty cell begins at 2.44 V. A cell that reads a whole volt less has
+# been discharged far beyond empty and must not be charged fast, if it is the cell that is wrong.
+_LOWEST_VOLTAGE_V = 1.5
+
+# Between voltage_overshoot_V and this above its limit the cell is over-voltage, a fault of its own.
+# At 10C the ohmic drop is 0.26 to 0.29 V; twice that above the limit is a wire, not a cell.
+_VOLTAGE_HEADROOM_V = 0.6
 
 _DEVIATIONS = {
-    # Many times the error of sensor and bus together (0.03 A); a growing current is one step of
-    # the growth limit behind (0.23 A with 1C per second and 0.1 s).
+    # Current against the last command, which the charger answers a period later. A growing current
+    # is one step of the growth limit behind (0.23 A: 1C per second for 0.1 s); a faster fall is
+    # over before the three periods that the fault takes.
     "current_deviation_A": 1.0,
-    # The polarisation that the model leaves out, and its open-circuit voltage being that of
-    # another age: some ten millivolts each at 10C; a wrong plug-in state of charge is more.
+    # Voltage against that of the model at counted charge and measured current. The model has no
+    # polarisation, temperature or age; 0.2 V leave room for a resistance of 8.7 mohm more than R0
+    # (11.4 and 12.5 mohm) at 10C. On the flat part of the curve (0.15 V from 10 to 90 % of charge)
+    # a wrong state of charge stays below it.
     "voltage_deviation_V": 0.2,
-    # The constraint holds the limit itself; what is above is the sensor's error and a lag.
+    # The constraint keeps the limit itself at the true voltage; twenty times the reading's error.
     "voltage_overshoot_V": 0.05,
-    # As much as the error bound of any shipped model, with the sensor's error, several times.
+    # Surface above its limit; estimated core above its limit and the model's error bound. Within
+    # the modelled uncertainty the worst is 0.08 K, after a minute without a safe current
+    # (docs/theory.md), and the reading's error.
     "temperature_overshoot_K": 2.0,
-    # Below the coldest that the heat allows, a bound already: errors of sensor and prediction.
+    # Surface below the coldest that the heat allows, from which the errors of sensors, bus and
+    # disturbances are subtracted already (0.20 and 0.23 K); the rest is for cells whose resistances
+    # differ. A reading that is colder is not used meanwhile, so that waiting costs no safety.
     "surface_deficit_K": 1.0,
 }
 

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from bms.arrays import Array
 from bms.errors import InputError
 from bms.validation import Finite, Positive, strict
 
@@ -34,11 +35,11 @@ class OpenCircuitVoltage:
         if not (np.all(np.diff(self.soc) > 0) and np.all(np.diff(self.voltage_V) > 0)):
             raise InputError("cell.ocv: soc and voltage_V must both rise strictly")
 
-    def __call__(self, soc: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    def __call__(self, soc: npt.ArrayLike) -> Array:
         """Voltage in V at a state of charge of any shape; held constant outside 0..1."""
         return np.interp(np.asarray(soc, dtype=np.float64), self.soc, self.voltage_V)
 
-    def slopes_V(self) -> npt.NDArray[np.float64]:
+    def slopes_V(self) -> Array:
         """Slope dV/dSoC in V of each table segment."""
         return np.diff(self.voltage_V) / np.diff(self.soc)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from dataclasses import asdict
@@ -18,38 +17,37 @@ from bms.bounds.chart import write_chart
 from bms.bounds.conformal import CONFIDENCE
 from bms.bounds.derive import bounds_for_preset, bounds_for_recording, error_bound_parts_K
 from bms.bounds.record import ErrorBounds
-from bms.commands.options import DataOption
-from bms.data.datasets import simulated_split
-from bms.data.measurements import read_measurements
+from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands import options
+from bms.data.datasets import simulated_split, split_by_time
+from bms.data.measurements import read_measurements, recording_sha256
 from bms.data.simulate import joined
 from bms.errors import InputError
-from bms.files import write_text
-from bms.model.make import split_by_time
+from bms.files import make_folder, write_text
 from bms.model.model_file import KanModel, load_model
 from bms.model.pair import check_pair
 from bms.presets import load_preset
 
-LARGE_ENOUGH, TOO_SMALL = 0, 1
 _ROUND_OFF = 1e-9
 
 Found = tuple[ErrorBounds, dict[str, float], str]
 
 
 def bound(
-    model: Annotated[Path, typer.Option("--model", help="Model (JSON).")],
+    model: options.RequiredModelOption,
     preset: Annotated[
-        str | None,
-        typer.Option("--preset", help="Preset to search; none: the one of the model."),
+        str | None, options.preset_option("Preset to search", "the one of the model")
     ] = None,
-    data: DataOption = None,
-    seed: Annotated[
-        int | None, typer.Option("--seed", min=0, help="Of the search; none: that of the training.")
-    ] = None,
+    data: options.DataOption = None,
+    seed: Annotated[int | None, options.seed_option("the search", "that of the training")] = None,
     confidence: Annotated[
-        float, typer.Option("--confidence", min=0.01, max=0.999, help="Of the conformal bound.")
+        float,
+        typer.Option(
+            "--confidence", min=0.01, max=0.999, help="Confidence of the conformal bound."
+        ),
     ] = CONFIDENCE,
-    out: Annotated[Path | None, typer.Option("--out", help="Folder for plot and JSON.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    out: Annotated[Path | None, options.out_folder_option("bound.json and bound.png")] = None,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Derive the bounds (K) on the error of the estimate anew and compare with the model's own.
 
@@ -76,7 +74,7 @@ def bound(
         typer.echo(json.dumps(result, indent=1))
     else:
         _print(str(model), found[0], result)
-    return LARGE_ENOUGH if result["holds"] else TOO_SMALL
+    return EXIT_DONE if result["holds"] else EXIT_CHECK_FAILED
 
 
 def _from_preset(model: KanModel, name: str, seed: int, confidence: float) -> Found:
@@ -94,8 +92,7 @@ def _from_preset(model: KanModel, name: str, seed: int, confidence: float) -> Fo
 
 def _from_recording(model: KanModel, path: Path, seed: int, confidence: float) -> Found:
     recording = read_measurements(path).samples(model.network.lags)
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    if digest == model.training.data_sha256:
+    if recording_sha256(path) == model.training.data_sha256:
         training, held_out = split_by_time(recording)
         source = f"{path.name}, last third"
     else:
@@ -122,10 +119,7 @@ def _result(
 
 
 def _write(folder: Path, bounds: ErrorBounds, result: dict[str, Any]) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made ({error.strerror}); choose another") from None
+    make_folder(folder)
     write_chart(bounds.theorem, folder / "bound.png")
     write_text(folder / "bound.json", json.dumps(result, indent=1) + "\n")
 

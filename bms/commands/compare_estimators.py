@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import time
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -15,35 +14,38 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from bms.commands.options import DataOption
+from bms.commands import options
+from bms.data.measurements import recording_sha256
 from bms.errors import InputError
-from bms.files import write_text
+from bms.files import make_folder, write_text
 from bms.kan.network import INPUT_NAMES
 from bms.model.model_file import load_model, load_shipped_model, shipped_model_path
 from bms.presets import Preset, load_preset
-
-if TYPE_CHECKING:
-    from bms.studies.rivals.comparison import Comparison, NamedModel, Row
+from bms.studies.rivals.chart import save_chart
+from bms.studies.rivals.comparison import Comparison, NamedModel, Row, run_comparison
+from bms.studies.rivals.effort import FULL, QUICK
+from bms.studies.rivals.lagged import all_lags
+from bms.studies.rivals.recorded import recorded_problem
+from bms.studies.rivals.simulated import simulated_problem
+from bms.studies.rivals.verdict import verdict
 
 DEFAULT_CELL = "lin2014"
 _TABLE_WIDTH = 140
 
 
 def compare_estimators(
-    preset: Annotated[
-        str | None, typer.Option("--preset", help="Simulate the data from it: name or .toml file.")
-    ] = None,
-    data: DataOption = None,
+    preset: options.SimulatedPresetOption = None,
+    data: options.DataOption = None,
     model: Annotated[
         list[Path] | None,
-        typer.Option("--model", help="Network to compare (JSON), besides the preset's own."),
+        options.model_option("Model to compare beside the preset's own", repeated=True),
     ] = None,
     cell: Annotated[
         str | None,
-        typer.Option(
-            "--cell",
-            help="With --data: preset (name or .toml) whose cell the filters take as it is; "
-            f"none: that of {DEFAULT_CELL}, fitted to the first two thirds.",
+        options.preset_option(
+            "With --data, preset whose cell the filters take as it is",
+            f"that of {DEFAULT_CELL}, fitted to the first two thirds",
+            name="--cell",
         ),
     ] = None,
     profiles: Annotated[
@@ -51,15 +53,15 @@ def compare_estimators(
         typer.Option("--profiles", min=1, help="With --preset: profiles of each kind and split."),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option("--seed", min=0, help="Of data and fits; none: the network's.")
+        int | None, options.seed_option("data and fits", "that of the training")
     ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Fit MLP and floor for a moment only: a first look.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for estimators.json and estimators.png.")
+        Path | None, options.out_folder_option("estimators.json and estimators.png")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Compare the KAN with its rivals: error (K), size, work and time of an estimate in float32 C.
 
@@ -69,13 +71,6 @@ def compare_estimators(
 
     Example: bms compare-estimators --preset paper_calibrated --out out/estimators
     """
-    # Imported here, so that the other commands start where the firmware is not compiled.
-    from bms.studies.rivals.chart import save_chart  # noqa: PLC0415
-    from bms.studies.rivals.comparison import compare  # noqa: PLC0415
-    from bms.studies.rivals.effort import FULL, QUICK  # noqa: PLC0415
-    from bms.studies.rivals.lagged import all_lags  # noqa: PLC0415
-    from bms.studies.rivals.verdict import verdict  # noqa: PLC0415
-
     if (preset is None) == (data is None):
         raise InputError("compare-estimators: give either --preset NAME or --data CSV")
     if preset is None and profiles is not None:
@@ -91,16 +86,13 @@ def compare_estimators(
     of_models = models[0].model.training.settings.seed if models else 0
     used_seed = of_models if seed is None else seed
     if out is not None:
-        _make_folder(out)
+        make_folder(out)
     if data is not None:
-        from bms.studies.rivals.recorded import recorded_problem  # noqa: PLC0415
-
         problem = recorded_problem(data, chosen, cell is None, lags)
     else:
-        from bms.studies.rivals.simulated import simulated_problem  # noqa: PLC0415
-
         problem = simulated_problem(chosen, used_seed, lags, profiles)
-    comparison = compare(problem, models, used_seed, time.perf_counter_ns, QUICK if quick else FULL)
+    effort = QUICK if quick else FULL
+    comparison = run_comparison(problem, models, used_seed, time.perf_counter_ns, effort)
     sentences = verdict(comparison)
     result = {
         "data": comparison.title,
@@ -125,8 +117,6 @@ def compare_estimators(
 
 def _models(preset: Preset | None, paths: list[Path]) -> list[NamedModel]:
     """The preset's own network first, then those of the files, which can do without it."""
-    from bms.studies.rivals.comparison import NamedModel  # noqa: PLC0415
-
     models = []
     if preset is not None and (shipped_model_path(preset.name).is_file() or not paths):
         models.append(NamedModel("KAN", load_shipped_model(preset.name)))
@@ -152,7 +142,7 @@ def _warnings(models: list[NamedModel], data: Path | None, preset: Preset) -> li
             "of a network that does not belong to the cell"
             for name in strangers
         ]
-    digest = _digest(data)
+    digest = recording_sha256(data)
     warnings = [
         f"{name} was not trained on {data.name} but on {model.training.data}; its errors say "
         "little about the method"
@@ -164,22 +154,6 @@ def _warnings(models: list[NamedModel], data: Path | None, preset: Preset) -> li
             "no network in the table; train one with 'bms train --data' and give it as --model"
         )
     return warnings
-
-
-def _digest(path: Path) -> str:
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
-
-
-def _make_folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"{out}: cannot be made ({error.strerror}); choose another folder"
-        ) from None
 
 
 def _content(row: Row) -> dict[str, Any]:

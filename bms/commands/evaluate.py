@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from enum import Enum
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -15,11 +14,12 @@ from rich.markup import escape
 from rich.table import Table
 
 from bms.arrays import Array, Mask
-from bms.commands.options import DataOption
+from bms.commands import options
 from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
 from bms.data.simulate import Samples, joined
 from bms.errors import InputError
+from bms.firmware import CompiledNetwork
 from bms.kan.accuracy import error_figures
 from bms.model.model_file import KanModel, load_model
 from bms.model.pair import check_pair
@@ -34,15 +34,13 @@ class Engine(str, Enum):
 
 
 def evaluate(
-    model: Annotated[Path, typer.Option("--model", help="Model to evaluate (JSON).")],
-    data: DataOption = None,
-    preset: Annotated[
-        str | None, typer.Option("--preset", help="Simulate new profiles from it.")
-    ] = None,
+    model: options.RequiredModelOption,
+    data: options.DataOption = None,
+    preset: options.SimulatedPresetOption = None,
     engine: Annotated[
         Engine, typer.Option("--engine", help="c is the firmware's float32; python is double.")
     ] = Engine.C,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Print the errors (K) of the estimated core temperature over all samples.
 
@@ -80,8 +78,5 @@ def _estimate(
 ) -> tuple[Array, Mask]:
     if engine is Engine.PYTHON:
         return model.network.evaluate(samples.inputs)
-    # Imported here, so that the Python engine works where the firmware is not compiled.
-    from bms.firmware import CompiledNetwork  # noqa: PLC0415
-
     compiled = CompiledNetwork(model)
     return compiled.follow(samples) if is_recording else compiled.evaluate(samples.inputs)

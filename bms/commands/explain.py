@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bms.arrays import Array
-from bms.commands.options import DataOption
+from bms.commands import options
 from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
 from bms.data.simulate import joined
@@ -21,6 +21,10 @@ from bms.files import write_text
 from bms.kan.network import INPUT_NAMES
 from bms.model.model_file import KanModel, load_model
 from bms.presets import load_preset
+from bms.studies.explanation import explain as explained
+from bms.studies.explanation.plots import layer_figure, sensitivity_figure
+from bms.studies.explanation.report import Subject, as_latex, as_text
+from bms.studies.explanation.report import as_json as as_content
 
 _PROFILES = 30
 _UNIFORM_POINTS = 20000
@@ -28,13 +32,16 @@ _DPI = 110
 
 
 def explain(
-    model: Annotated[Path, typer.Option("--model", help="Model to explain (JSON).")],
-    out: Annotated[Path, typer.Option("--out", help="Folder for plots, formulas and JSON.")],
-    data: DataOption = None,
+    model: options.RequiredModelOption,
+    out: Annotated[
+        Path, options.out_folder_option("plots, formulas and explanation.json", default=None)
+    ],
+    data: options.DataOption = None,
     preset: Annotated[
-        str | None, typer.Option("--preset", help="Simulate the data from it: name or .toml file.")
+        str | None,
+        options.preset_option("Preset to simulate the data from", "the one of the model"),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show the edge functions of a model, formulas for them, and its sensitivities.
 
@@ -44,12 +51,6 @@ def explain(
 
     Example: bms explain --model model.json --out out/explain
     """
-    # Imported here, so that the other commands start without Matplotlib's seconds.
-    from bms.studies.explanation import explain as explained  # noqa: PLC0415
-    from bms.studies.explanation.plots import layer_figure, sensitivity_figure  # noqa: PLC0415
-    from bms.studies.explanation.report import Subject, as_latex, as_text  # noqa: PLC0415
-    from bms.studies.explanation.report import as_json as as_content  # noqa: PLC0415
-
     loaded = load_model(model)
     inputs, source = _inputs(loaded, data, preset)
     result = explained(loaded.network, inputs)

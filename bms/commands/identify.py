@@ -5,35 +5,36 @@ from __future__ import annotations
 import dataclasses
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from bms.commands.options import DataOption
+from bms.commands import options
+from bms.data.datasets import training_rows
 from bms.data.measurements import read_measurements
 from bms.errors import InputError
 from bms.files import write_text
+from bms.identification import Identification
+from bms.identification import identify as identified
+from bms.identification.preset_toml import preset_toml
 from bms.presets import Preset, load_preset
 
-if TYPE_CHECKING:
-    from bms.identification import Identification
-
-_FITTED_SHARE = 2.0 / 3.0
 _DIGITS = 6
 
 
 def identify(
-    data: DataOption,
+    data: options.DataOption,
     preset: Annotated[
-        str, typer.Option("--preset", help="Start, and values that the data do not identify.")
+        str,
+        options.preset_option("Preset to start from, and for what the data do not identify"),
     ] = "lin2014",
     out: Annotated[
         Path | None, typer.Option("--out", help="Preset with the fitted cell to write (.toml).")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Fit a cell's thermal parameters to measured core and surface temperature (K).
 
@@ -42,18 +43,15 @@ def identify(
 
     Example: bms identify --data cycle.csv --preset lin2014 --out my_cell.toml
     """
-    from bms.identification import identify as fit  # noqa: PLC0415  (SciPy's optimisers load slowly)
-    from bms.identification.preset_toml import preset_toml  # noqa: PLC0415
-
     if data is None:
         raise InputError("identify: give --data CSV")
     if out is not None and out.suffix != ".toml":
         raise InputError(f"--out {out}: a preset is a file with the ending .toml; change the name")
     start = load_preset(preset)
     recording = read_measurements(data)
-    cut = round(_FITTED_SHARE * len(recording.time_s))
+    cut = training_rows(len(recording.time_s))
     try:
-        result = fit(recording, start, slice(0, cut))
+        result = identified(recording, start, slice(0, cut))
     except InputError as error:
         raise InputError(f"{data}: {error}") from None
     if out is not None:

@@ -13,11 +13,13 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from bms.commands.options import DataOption
+from bms.commands import options
 from bms.errors import InputError
 from bms.kan.network import INPUT_NAMES
+from bms.kan.scaling import Scaling
 from bms.model.model_file import KanModel, save_model
 from bms.presets import DEFAULT_PRESET, Preset, load_preset
+from bms.pykan_import import imported_model, imported_network, read_checkpoint
 from bms.tables import network_tables
 
 
@@ -25,11 +27,12 @@ def import_pykan(
     checkpoint: Annotated[
         Path, typer.Argument(help="What saveckpt was given: PATH of PATH_config.yml, PATH_state.")
     ],
-    out: Annotated[Path, typer.Option("--out", help="Model to write (JSON).")],
+    out: options.ModelOutOption,
     preset: Annotated[
-        str, typer.Option("--preset", help="Its box is the default scaling, its profiles the test.")
+        str,
+        options.preset_option("Preset for the default scaling (its box) and the test profiles"),
     ] = DEFAULT_PRESET,
-    data: DataOption = None,
+    data: options.DataOption = None,
     center: Annotated[
         str | None, typer.Option("--center", help="Middle of each input (A, W, K, K), as a,b,c,d.")
     ] = None,
@@ -43,7 +46,7 @@ def import_pykan(
     output_half_range_K: Annotated[
         float, typer.Option("--output-half-range", help="Kelvin for each 1 of pykan's output.")
     ] = 1.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Import a network that pykan has trained on inputs scaled to -1..1, and test it.
 
@@ -54,10 +57,6 @@ def import_pykan(
 
     Example: bms import-pykan model/0.1 --out model.json --output-center 300 --output-half-range 20
     """
-    # Imported here, so that the other commands start without SciPy's and PyTorch's seconds.
-    from bms.kan.scaling import Scaling  # noqa: PLC0415
-    from bms.pykan_import import imported_model, imported_network, read_checkpoint  # noqa: PLC0415
-
     chosen = load_preset(preset)
     if not output_half_range_K > 0.0:
         raise InputError("--output-half-range: must be above 0")
@@ -108,13 +107,13 @@ def _box(preset: Preset, inputs: int) -> tuple[list[float], list[float]]:
 
 
 def _numbers(option: str, text: str) -> list[float]:
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = [math.nan]
-    if not all(math.isfinite(value) for value in values):
-        raise InputError(f"{option}: '{text}' is not a list of numbers such as -12,1,300,295")
-    return values
+    return options.number_list(option, text, _finite, "-12,1,300,295")
+
+
+def _finite(text: str) -> float:
+    if not math.isfinite(value := float(text)):
+        raise ValueError
+    return value
 
 
 def _result(model: KanModel) -> dict[str, Any]:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated
 
 import typer
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from bms.commands.options import DataOption
+from bms.commands import options
 from bms.errors import InputError
 from bms.kan.network import INPUT_NAMES
 from bms.kan.settings import TrainingSettings
@@ -22,18 +21,16 @@ from bms.presets import load_preset
 from bms.validation import parse
 
 DEFAULTS = TrainingSettings()
+_LIST_EXAMPLE = "4,1,1"
 _LAGS_OF_PRESETS_S = (3.0,)
 _LAGS_OF_RECORDINGS_S = (10.0, 160.0)
-_Number = TypeVar("_Number", int, float)
 
 
 def train(
-    out: Annotated[Path, typer.Option("--out", help="Model to write (JSON).")],
-    preset: Annotated[
-        str | None, typer.Option("--preset", help="Simulate the data from it: name or .toml file.")
-    ] = None,
-    data: DataOption = None,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of data and training.")] = DEFAULTS.seed,
+    out: options.ModelOutOption,
+    preset: options.SimulatedPresetOption = None,
+    data: options.DataOption = None,
+    seed: Annotated[int, options.seed_option("data and training")] = DEFAULTS.seed,
     lagged: Annotated[
         bool,
         typer.Option("--lagged", help="Add low-pass filtered current squared and surface rise."),
@@ -71,13 +68,18 @@ def train(
         raise InputError("train: give either --preset NAME or --data CSV")
     constants_s: list[float] = []
     if lag_time_constants_s is not None:
-        constants_s = _numbers(lag_time_constants_s, "--lag-time-constants", float)
+        constants_s = options.number_list(
+            "--lag-time-constants", lag_time_constants_s, float, _LIST_EXAMPLE
+        )
     elif lagged:
         constants_s = list(_LAGS_OF_PRESETS_S if data is None else _LAGS_OF_RECORDINGS_S)
     inputs = len(INPUT_NAMES) + 2 * len(constants_s)
+    nodes = [inputs, 1, 1]
+    if width is not None:
+        nodes = options.number_list("--width", width, int, _LIST_EXAMPLE)
     settings = _settings(
         seed=seed,
-        width=[inputs, 1, 1] if width is None else _numbers(width, "--width", int),
+        width=nodes,
         lag_time_constants_s=constants_s,
         grid=grid,
         degree=degree,
@@ -104,13 +106,6 @@ def train(
 
 def _settings(**values: object) -> TrainingSettings:
     return parse(TrainingSettings, values, "train")
-
-
-def _numbers(text: str, option: str, kind: Callable[[str], _Number]) -> list[_Number]:
-    try:
-        return [kind(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"{option}: '{text}' is not a list of numbers such as 4,1,1") from None
 
 
 def _require_writable(out: Path) -> None:

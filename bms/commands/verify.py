@@ -4,34 +4,32 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
+from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands import options
+from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
 from bms.verification import CLASHING_DELTA4, SLIPS, Formulas, Verification, slips_of
+from bms.verification import verify as certify
+from bms.verification.closed_loop import HORIZON_S, SlipCost, slip_cost
 from bms.verification.search import CounterExample
-
-CERTIFIED, NOT_CERTIFIED = 0, 1
 
 
 def verify(
-    preset: Annotated[
-        str, typer.Option("--preset", help="Preset by name or TOML file.")
-    ] = DEFAULT_PRESET,
-    model: Annotated[
-        Path | None, typer.Option("--model", help="Model (JSON); none: the preset's own.")
-    ] = None,
+    preset: options.PresetOption = DEFAULT_PRESET,
+    model: options.ModelOption = None,
     formulas: Annotated[
         Formulas, typer.Option("--formulas", help="paper: with the slips of the printed formulas.")
     ] = Formulas.CORRECTED,
     slips: Annotated[
         bool, typer.Option("--slips", help="Also charge with each slip and show what it costs.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Certify that no decision lets a limit be crossed before the next decision acts.
 
@@ -41,11 +39,6 @@ def verify(
 
     Example: bms verify --preset lin2014 --json
     """
-    # Imported here, so that the other commands start where the firmware is not compiled.
-    from bms.model.pair import load_pair  # noqa: PLC0415
-    from bms.verification.closed_loop import slip_cost  # noqa: PLC0415
-    from bms.verification.verify import verify as certify  # noqa: PLC0415
-
     pair = load_pair(preset, model)
     result = certify(*pair, slips_of(formulas))
     costs = []
@@ -60,24 +53,8 @@ def verify(
     else:
         _print(result)
         if costs:
-            table = Table(
-                "slip", "certified", "core excess K", "surface excess K", "voltage excess V",
-                "charge s", "core peak K", "surface peak K",
-            )  # fmt: skip
-            for cost in costs:
-                time_s = cost.charge_time_s
-                table.add_row(
-                    cost.slip,
-                    "yes" if cost.certified else "no",
-                    f"{cost.core_excess_K:+.5f}",
-                    f"{cost.surface_excess_K:+.5f}",
-                    f"{cost.voltage_excess_V:+.5f}",
-                    f"{time_s:.1f}" if time_s is not None else f"soc {cost.soc:.2f} in 1800 s",
-                    f"{cost.core_peak_K:.3f}",
-                    f"{cost.surface_peak_K:.3f}",
-                )
-            Console().print(table)
-    return CERTIFIED if result.certified else NOT_CERTIFIED
+            _print_costs(costs)
+    return EXIT_DONE if result.certified else EXIT_CHECK_FAILED
 
 
 def _print(result: Verification) -> None:
@@ -131,6 +108,26 @@ def _print(result: Verification) -> None:
         f"{result.preset} ({formulas}): {verdict} for {result.held_s:g} s from each reading, "
         f"{result.wall_time_s:.1f} s"
     )
+
+
+def _print_costs(costs: list[SlipCost]) -> None:
+    table = Table(
+        "slip", "certified", "core excess K", "surface excess K", "voltage excess V",
+        "charge s", "core peak K", "surface peak K",
+    )  # fmt: skip
+    for cost in costs:
+        time_s = cost.charge_time_s
+        table.add_row(
+            cost.slip,
+            "yes" if cost.certified else "no",
+            f"{cost.core_excess_K:+.5f}",
+            f"{cost.surface_excess_K:+.5f}",
+            f"{cost.voltage_excess_V:+.5f}",
+            f"{time_s:.1f}" if time_s is not None else f"soc {cost.soc:.2f} in {HORIZON_S:g} s",
+            f"{cost.core_peak_K:.3f}",
+            f"{cost.surface_peak_K:.3f}",
+        )
+    Console().print(table)
 
 
 def _example(example: CounterExample | None) -> str:

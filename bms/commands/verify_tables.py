@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,26 +11,26 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
+from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands import options
 from bms.errors import InputError
 from bms.model.model_file import KanModel, load_model, shipped_models
+from bms.verification.exhaustive import EdgeCheck, check_network
 
-HELD, BROKEN = 0, 1
 _STRIDE = 8191
 
 
 def verify_tables(
     model: Annotated[
         list[Path] | None,
-        typer.Option("--model", help="Model (JSON), any number of times; none: all shipped ones."),
+        options.model_option("Model to check", "all shipped ones", repeated=True),
     ] = None,
     stride: Annotated[
         int,
         typer.Option("--stride", min=1, help="Try each n-th argument; 1 tries all 2^32 of them."),
     ] = _STRIDE,
-    processes: Annotated[
-        int | None, typer.Option("--processes", min=1, help="Processes; none: one for each core.")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON only.")] = False,
+    processes: Annotated[int, options.processes_option("--processes")] = options.DEFAULT_PROCESSES,
+    as_json: options.JsonOption = False,
 ) -> int:
     """Hold the firmware's edge functions in C against the double-precision ones.
 
@@ -41,9 +40,6 @@ def verify_tables(
 
     Example: bms verify-tables --model model.json --stride 1
     """
-    # Imported here, so that the other commands start where the firmware is not compiled.
-    from bms.verification.exhaustive import EdgeCheck, check_network  # noqa: PLC0415
-
     paths = list(model) if model else shipped_models()
     models = {str(path): _bounded(load_model(path), path) for path in paths}
     rows: list[dict[str, Any]] = []
@@ -55,16 +51,14 @@ def verify_tables(
             def progress(share: float) -> None:
                 bar.advance(task, share)
 
-            checks: list[EdgeCheck] = check_network(
-                loaded.network, stride, processes or os.cpu_count() or 1, progress
-            )
+            checks: list[EdgeCheck] = check_network(loaded.network, stride, processes, progress)
             rows += [_row(name, loaded, check) for check in checks]
     holds = all(row["holds"] for row in rows)
     if as_json:
         typer.echo(json.dumps({"stride": stride, "holds": holds, "edges": rows}, indent=1))
     else:
         _print(rows, stride, holds)
-    return HELD if holds else BROKEN
+    return EXIT_DONE if holds else EXIT_CHECK_FAILED
 
 
 def _bounded(model: KanModel, path: Path) -> KanModel:
@@ -76,7 +70,7 @@ def _bounded(model: KanModel, path: Path) -> KanModel:
     return model
 
 
-def _row(name: str, model: KanModel, check: Any) -> dict[str, Any]:
+def _row(name: str, model: KanModel, check: EdgeCheck) -> dict[str, Any]:
     bound = model.edge_error_bounds[check.edge]
     return {
         "model": name,

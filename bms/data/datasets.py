@@ -1,4 +1,4 @@
-"""Splits of simulated data by whole profiles: no profile has samples in two splits."""
+"""Splits of data: simulated profiles by whole profiles, a recording by time."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from bms.presets import Preset
 Split = Literal["training", "validation", "test", "evaluation"]
 _SPLITS: tuple[Split, ...] = ("training", "validation", "test", "evaluation")
 
+TRAINING_SHARE = 2.0 / 3.0
+"""Of a recording, from its beginning; the rest tests."""
+
 PROFILES_OF_EACH_KIND: dict[Split, int] = {
     "training": 100,
     "validation": 30,
@@ -27,8 +30,9 @@ def simulated_split(
 ) -> dict[Kind, Samples]:
     """Constant and dynamic profiles of one split, `count` of each kind (None: as shipped).
 
-    Every pair of seed and split has its own random stream; "evaluation" is used nowhere in
-    training, so that `bms evaluate` shows profiles that not even e_max was read from.
+    No profile has samples in two splits. Every pair of seed and split has its own random stream;
+    "evaluation" is used nowhere in training, so that `bms evaluate` shows profiles that not even
+    e_max was read from.
     """
     profiles = PROFILES_OF_EACH_KIND[split] if count is None else count
     rng = np.random.default_rng([seed, _SPLITS.index(split)])
@@ -36,3 +40,14 @@ def simulated_split(
         kind: simulate(preset, draw_profiles(preset, kind, profiles, rng), rng, lags)
         for kind in KINDS
     }
+
+
+def training_rows(rows: int) -> int:
+    """How many rows of a recording, from the first, are for training or fitting."""
+    return round(TRAINING_SHARE * rows)
+
+
+def split_by_time(recording: Samples) -> tuple[Samples, Samples]:
+    """The first two thirds of a recording, for training, and the last one, for testing."""
+    cut = training_rows(len(recording.core_temperature_K))
+    return recording.rows(slice(cut)), recording.rows(slice(cut, None))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
@@ -95,6 +96,14 @@ def read_measurements(path: Path) -> Measurements:
     if not values:
         raise InputError(f"{path}: holds no measurement; give a file with at least one row")
     return Measurements(*np.array(values).T.copy())
+
+
+def recording_sha256(path: Path) -> str:
+    """SHA-256 of a recording's file as hexadecimal text; InputError when it cannot be read."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
 
 
 def _next_row(rows: Iterator[list[str]], path: Path) -> list[str] | None:

@@ -6,9 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from bms.arrays import Array
+from bms.arrays import Array, IntArray
 from bms.cell import CellParameters, CellState, Disturbance, integrate_step
 from bms.data.lags import Lags, at_rest, step
 from bms.data.profiles import SAMPLE_PERIOD_S, Profiles
@@ -29,7 +28,7 @@ class Samples:
 
     inputs: Array
     core_temperature_K: Array
-    profile: npt.NDArray[np.int64]
+    profile: IntArray
     time_s: Array
 
     def rows(self, rows: slice) -> Samples:

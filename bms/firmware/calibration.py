@@ -12,6 +12,23 @@ from bms.model.model_file import KanModel
 from bms.presets import DEFAULT_PRESET, Preset, load_preset
 
 
+def calibration_bytes(preset: Preset, model: KanModel) -> bytes:
+    """The calibration block as it stands in flash; raises what calibration_block raises."""
+    return bytes(ffi.buffer(calibration_block(preset, model, compiled_in=False)))
+
+
+def calibration_hashes(content: bytes) -> tuple[int, int]:
+    """First 32 bits of the hashes of model and preset in a block as it stands in flash.
+
+    Raises ValueError for fewer bytes than a block has.
+    """
+    size = ffi.sizeof("bms_calibration_t")
+    if len(content) < size:
+        raise ValueError(f"a calibration block has {size} bytes, not {len(content)}")
+    block = ffi.from_buffer("bms_calibration_t *", content)
+    return block.model_hash, block.preset_hash
+
+
 def calibration_block(
     preset: Preset,
     model: KanModel,

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bms.arrays import Array, Mask
 from bms.barrier import sampling_margins
 from bms.data.simulate import Samples
 from bms.decision import ACTIVE_CONSTRAINTS, ConstraintMargins, Decision
@@ -40,9 +41,7 @@ class CompiledNetwork:
         self._inputs = len(model.network.input_names)
         self._model = self._sampled_every(1.0)
 
-    def evaluate(
-        self, inputs: npt.ArrayLike
-    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+    def evaluate(self, inputs: npt.ArrayLike) -> tuple[Array, Mask]:
         """Core temperature in K and domain flag, both (N,), for inputs (N, n_in)."""
         with np.errstate(over="ignore"):  # what float32 cannot hold is out of the domain
             rows = np.ascontiguousarray(inputs, dtype=np.float32)
@@ -58,7 +57,7 @@ class CompiledNetwork:
         )
         return core.astype(np.float64), in_domain.astype(np.bool_)
 
-    def follow(self, recording: Samples) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+    def follow(self, recording: Samples) -> tuple[Array, Mask]:
         """As `evaluate`, for one recording that begins at rest; filters run in the firmware too.
 
         Only the first four inputs of the samples are used.

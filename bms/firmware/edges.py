@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from bms.arrays import Float32Array
 from bms.firmware._firmware import ffi, lib
 from bms.kan.network import Network
 from bms.tables import network_tables
-
-Float32 = npt.NDArray[np.float32]
 
 
 class CompiledEdges:
@@ -20,7 +19,11 @@ class CompiledEdges:
         self._model = ffi.new("kan_model_t *", network_tables(network).fields(network, 1.0))
 
     def evaluate(
-        self, edge: int, arguments: Float32, values: Float32, in_domain: npt.NDArray[np.uint8]
+        self,
+        edge: int,
+        arguments: Float32Array,
+        values: Float32Array,
+        in_domain: npt.NDArray[np.uint8],
     ) -> None:
         """Write value and domain flag (1 or 0) of the edge at every argument; all are (N,)."""
         lib.host_edge_values(

@@ -1,7 +1,7 @@
 """Flash images: their memory map, headers, checks, and the parts that can be replaced."""
 
+from bms.firmware.image_header import Header
 from bms.image.check import check_application, check_calibration, check_image
-from bms.image.header import Header
 from bms.image.memory_map import MEMORY_MAP, TARGETS
 from bms.image.parts import calibration_of, calibration_part, with_calibration
 

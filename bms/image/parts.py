@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-from bms.firmware._firmware import ffi, lib
-from bms.firmware.calibration import calibration_block
-from bms.image.header import CALIBRATION, HEADER_LENGTH, Header
+from bms.firmware.calibration import calibration_bytes, calibration_hashes
+from bms.firmware.image_header import (
+    ANY_TARGET,
+    CALIBRATION_LAYOUT,
+    CALIBRATION_MAGIC,
+    FIRMWARE_VERSION,
+    HEADER_LAYOUT,
+    HEADER_LENGTH,
+    Header,
+)
 from bms.image.memory_map import ERASED, MEMORY_MAP
 from bms.image.seal import sealed_part
 from bms.model.model_file import KanModel
@@ -16,22 +23,22 @@ def calibration_part(preset: Preset, model: KanModel) -> bytes:
 
     Raises ModelMismatchError for a stale pair and InputError when the firmware refuses the block.
     """
-    block = calibration_block(preset, model, compiled_in=False)
-    content = bytes(ffi.buffer(block))
+    content = calibration_bytes(preset, model)
+    model_hash, preset_hash = calibration_hashes(content)
     length = HEADER_LENGTH + len(content)
     header = Header(
-        magic=CALIBRATION,
+        magic=CALIBRATION_MAGIC,
         crc32=0,
         length=length,
-        header_layout=lib.IMAGE_HEADER_LAYOUT,
-        target=lib.IMAGE_ANY_TARGET,
-        firmware_version=lib.BMS_FIRMWARE_VERSION,
-        calibration_layout=lib.BMS_CALIBRATION_LAYOUT,
+        header_layout=HEADER_LAYOUT,
+        target=ANY_TARGET,
+        firmware_version=FIRMWARE_VERSION,
+        calibration_layout=CALIBRATION_LAYOUT,
         calibration_length=length,
-        model_hash=block.model_hash,
-        preset_hash=block.preset_hash,
+        model_hash=model_hash,
+        preset_hash=preset_hash,
     )
-    return sealed_part(header.pack() + content, block.model_hash, block.preset_hash)
+    return sealed_part(header.pack() + content, model_hash, preset_hash)
 
 
 def calibration_of(image: bytes) -> bytes:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import zlib
 from dataclasses import replace
 
-from bms.firmware._firmware import ffi
-from bms.image.header import CRC_COVERS_FROM, HEADER_LENGTH, Header
+from bms.firmware.calibration import calibration_hashes
+from bms.firmware.image_header import CRC_COVERS_FROM, HEADER_LENGTH, Header
 from bms.image.memory_map import MEMORY_MAP
 
 _CRC_LENGTH = 4
@@ -31,12 +31,10 @@ def sealed_headers(image: bytes) -> dict[str, bytes]:
         "application_header": MEMORY_MAP.application.address,
         "calibration_header": MEMORY_MAP.calibration.address,
     }
-    block = ffi.from_buffer(
-        "bms_calibration_t *", image[places["calibration_header"] + HEADER_LENGTH :]
-    )
+    hashes = calibration_hashes(image[places["calibration_header"] + HEADER_LENGTH :])
     headers = {}
     for name, start in places.items():
         length = Header.parse(image[start:]).length
-        part = sealed_part(image[start : start + length], block.model_hash, block.preset_hash)
+        part = sealed_part(image[start : start + length], *hashes)
         headers[name] = part[:HEADER_LENGTH]
     return headers

@@ -10,9 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from bms.arrays import Array
+from bms.arrays import Array, Mask
 from bms.errors import InputError
 from bms.validation import Finite, strict
 
@@ -41,7 +40,7 @@ class Domain:
         if any(high <= low for low, high in zip(self.low, self.high)):
             raise InputError("domain: every low must be below its high")
 
-    def contains(self, x: Array) -> npt.NDArray[np.bool_]:
+    def contains(self, x: Array) -> Mask:
         """Whether normalised inputs (N, n_in) lie within all slabs, (N,)."""
         if not self.directions:
             return np.ones(len(x), dtype=np.bool_)

@@ -13,7 +13,7 @@ from bms.data.lags import Lags
 from bms.errors import InputError
 from bms.kan.basis import basis, silu
 from bms.kan.domain import EVERYWHERE, Domain
-from bms.validation import Finite, Positive, strict
+from bms.validation import Count, Finite, Positive, strict
 
 INPUT_NAMES = (
     "current_A",
@@ -61,7 +61,7 @@ class Network:
     Raises InputError when shapes do not fit together or knots do not rise.
     """
 
-    degree: Annotated[int, Ge(1)]
+    degree: Count
     input_names: tuple[str, ...]
     input_center: tuple[Finite, ...]
     input_half_range: tuple[Positive, ...]
@@ -105,6 +105,11 @@ class Network:
     def width(self) -> tuple[int, ...]:
         """Number of nodes of the input and of each layer, such as (4, 1, 1)."""
         return (len(self.input_names), *(len(layer) for layer in self.layers))
+
+    @property
+    def edges(self) -> list[Edge]:
+        """All edges in the firmware's order: layer by layer, output by output, input by input."""
+        return [edge for layer in self.layers for row in layer for edge in row]
 
     def evaluate(self, inputs: Array) -> tuple[Array, Mask]:
         """Core temperature in K and whether it can be trusted (bool), both (N,).

@@ -9,9 +9,7 @@ from annotated_types import Ge, MinLen
 
 from bms.data.lags import Lag, Lags
 from bms.errors import InputError
-from bms.validation import NonNegative, Positive, strict
-
-Count = Annotated[int, Ge(1)]
+from bms.validation import Count, NonNegative, Positive, strict
 
 
 @strict

@@ -1,4 +1,4 @@
-"""A trained estimator as a file: its provenance, its making, and the preset it belongs to."""
+"""Trained estimators: how they are made, the file that holds one, the preset that it goes with."""
 
 from bms.model.model_file import (
     KanModel,

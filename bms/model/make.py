@@ -1,10 +1,9 @@
-"""From data to a finished model: training, errors on every split, error bound."""
+"""Making of a model from data: training, errors on every split, error bound."""
 
 from __future__ import annotations
 
-import hashlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +16,8 @@ from bms.bounds.derive import (
     error_bound_parts_K,
 )
 from bms.bounds.record import ErrorBounds
-from bms.data.datasets import PROFILES_OF_EACH_KIND, Split, simulated_split
-from bms.data.measurements import read_measurements
+from bms.data.datasets import PROFILES_OF_EACH_KIND, Split, simulated_split, split_by_time
+from bms.data.measurements import read_measurements, recording_sha256
 from bms.data.simulate import Samples, joined
 from bms.errors import InputError
 from bms.kan.accuracy import ErrorFigures, error_figures
@@ -26,15 +25,11 @@ from bms.kan.measured import train_on_recording
 from bms.kan.network import Network
 from bms.kan.scaling import Ranges
 from bms.kan.settings import TrainingSettings
-from bms.kan.training import train_network
+from bms.kan.training import Progress, train_network
 from bms.model.model_file import FORMAT_VERSION, KanModel, SplitErrors, TrainingRecord
 from bms.presets import Preset
 from bms.tables.rounding import edge_error_bounds, fits_firmware
 
-Progress = Callable[[float], None]
-
-TRAINING_SHARE = 2.0 / 3.0
-"""Of a recording; the rest tests."""
 _BOX_MARGIN = 0.1
 _SMALLEST_HALF_RANGE = 0.5
 _FEWEST_ROWS = 100
@@ -46,7 +41,11 @@ def model_for_preset(
     progress: Progress,
     counts: Mapping[Split, int] = PROFILES_OF_EACH_KIND,
 ) -> KanModel:
-    """Model trained on profiles simulated from the preset; `counts` are profiles of each kind."""
+    """Model trained on profiles simulated from the preset.
+
+    `counts` are profiles of each kind; `progress` gets the share of the training that is done.
+    Raises InputError when the width does not fit the inputs, or the profiles are too few.
+    """
     splits: tuple[Split, ...] = ("training", "validation", "test")
     data = {
         split: simulated_split(preset, split, settings.seed, counts[split], settings.lags)
@@ -106,7 +105,7 @@ def model_for_measurements(path: Path, settings: TrainingSettings, progress: Pro
         TrainingRecord(
             settings,
             path.name,
-            hashlib.sha256(path.read_bytes()).hexdigest(),
+            recording_sha256(path),
             {"training": 1, "test": 1},
         ),
         {
@@ -119,12 +118,6 @@ def model_for_measurements(path: Path, settings: TrainingSettings, progress: Pro
     )
 
 
-def split_by_time(recording: Samples) -> tuple[Samples, Samples]:
-    """The first two thirds of a recording, for training, and the last one, for testing."""
-    cut = round(TRAINING_SHARE * len(recording.core_temperature_K))
-    return recording.rows(slice(cut)), recording.rows(slice(cut, None))
-
-
 def finished_model(
     network: Network,
     record: TrainingRecord,
@@ -133,7 +126,10 @@ def finished_model(
     bounds: ErrorBounds | None,
     preset: Preset | None,
 ) -> KanModel:
-    """A model with e_max, the sum of `parts_K`, and the bounds of its tables."""
+    """The model of a network: e_max is the sum of `parts_K`; the bounds of its tables are added.
+
+    Without a preset it was trained on measurements.
+    """
     return KanModel(
         FORMAT_VERSION,
         network,

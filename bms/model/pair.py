@@ -13,7 +13,10 @@ from bms.presets import Preset, load_preset
 def load_pair(
     preset: str | Path | Preset, model: str | Path | KanModel | None
 ) -> tuple[Preset, KanModel]:
-    """Preset and model by name, path or object; without a model the one that ships with it."""
+    """Preset and model by name, path or object; without a model the one that ships with it.
+
+    Whether they belong together is for check_pair. Raises InputError for what cannot be read.
+    """
     chosen = preset if isinstance(preset, Preset) else load_preset(preset)
     if isinstance(model, KanModel):
         return chosen, model
@@ -21,7 +24,11 @@ def load_pair(
 
 
 def check_pair(preset: Preset, model: KanModel) -> None:
-    """Raise ModelMismatchError when the model was trained for another cell or box."""
+    """Raise ModelMismatchError when the model does not belong to the preset.
+
+    That is, when it was trained for another cell, uncertainty or box, or has other inputs than the
+    firmware's four, with filtered ones behind them.
+    """
     names = model.network.input_names
     if names[: len(INPUT_NAMES)] != INPUT_NAMES or len(names) != len(INPUT_NAMES) + len(
         model.network.lags

@@ -9,6 +9,7 @@ import hashlib
 import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -115,8 +116,6 @@ def _tensors(path: Path) -> Any:
 
 
 def _module(name: str) -> Any:
-    from importlib import import_module  # noqa: PLC0415
-
     try:
         return import_module(name)
     except ImportError:

@@ -1,4 +1,4 @@
-"""Networks as the firmware's spline tables, and the rounding of its arithmetic."""
+"""Networks as the firmware's polynomial tables, and bounds on what tables and float32 add."""
 
 from bms.tables.network_tables import NetworkTables, network_tables
 

@@ -40,7 +40,7 @@ class EdgeTable:
 
 @dataclass(frozen=True)
 class NetworkTables:
-    """All edges in the firmware's order: layer by layer, output by output, input by input."""
+    """Tables of all edges in the order of Network.edges, and the bound on their error in K."""
 
     width: tuple[int, ...]
     cells: int
@@ -100,7 +100,7 @@ def network_tables(network: Network) -> NetworkTables:
     degree = network.degree
     if degree >= CELL_COEFFICIENTS:
         raise InputError(f"network: degree {degree} exceeds the firmware's {CELL_COEFFICIENTS - 1}")
-    edges = [edge for layer in network.layers for row in layer for edge in row]
+    edges = network.edges
     grid = max(len(edge.knots) - 1 - 2 * degree for edge in edges)
     tables = _build(network, edges, grid, 1)
     halvings = 1

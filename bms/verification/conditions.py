@@ -56,6 +56,23 @@ class Condition:
             - self.reserve
         )
 
+    def less(self, other: Condition) -> Condition:
+        """The condition whose value is this one's less the other's, both without error terms.
+
+        Equal coefficients cancel here, before any interval is formed.
+        """
+        shift = self.room * (self.limit_K - other.limit_K)
+        return Condition(
+            other.limit_K,
+            self.core_gap - other.core_gap,
+            self.coolant_gap - other.coolant_gap,
+            self.room - other.room,
+            self.coupling - other.coupling,
+            self.squared - other.squared,
+            self.cooling - other.cooling,
+            self.reserve - other.reserve - shift,
+        )
+
     def branches(self) -> tuple[tuple[float, float], ...]:
         """Terms (constant, per ampere), the smallest of which is the error term at any current."""
         p, q, e = self.core_gap, self.coupling, self.error_bound_K

@@ -10,7 +10,7 @@ import numpy as np
 from bms.barrier import BusQuantisation
 from bms.barrier.margins import soc_error_bound
 from bms.presets import Preset
-from bms.verification.thermal import Certificate
+from bms.verification.certificate import Certificate
 
 PARTS = 200_000
 CURRENT_ERROR_A = 1e-3

@@ -70,7 +70,7 @@ class EdgeSweep:
         """
         self._number = number
         self._degree = network.degree
-        self._edge: Edge = edges_of(network)[number]
+        self._edge: Edge = network.edges[number]
         self._compiled = CompiledEdges(network) if compiled is None else compiled
         self._knots = np.asarray(self._edge.knots[network.degree : -network.degree])
         self._end_values = self._edge.evaluate(self._knots[[0, -1]], self._degree)[0]
@@ -158,7 +158,7 @@ def check_network(
     An odd stride lets all bits of the argument vary. `progress` gets the share that a part of the
     work has had of the whole. Raises InputError when the network exceeds the firmware's maxima.
     """
-    numbers = range(len(edges_of(network)))
+    numbers = range(len(network.edges))
     if stride > 1:
         return [EdgeSweep(network, number).check_some(stride) for number in numbers]
     firsts = range(0, PATTERNS, _PART)
@@ -171,11 +171,6 @@ def check_network(
 
 def _check_part(network: Network, number: int, first: int) -> EdgeCheck:
     return EdgeSweep(network, number).check_all(first, first + _PART)
-
-
-def edges_of(network: Network) -> list[Edge]:
-    """All edges in the firmware's order."""
-    return [edge for layer in network.layers for row in layer for edge in row]
 
 
 def _order(half: float) -> int:

@@ -17,6 +17,7 @@ from scipy.optimize import linprog
 
 from bms.arrays import Array
 from bms.cell import CellParameters, CellState
+from bms.verification.barriers import Barrier
 from bms.verification.conditions import Condition
 from bms.verification.domain import Domain
 from bms.verification.search import simulate_hold
@@ -67,7 +68,7 @@ def infeasible_part(domain: Domain, decided: tuple[Condition, Condition]) -> Fal
         surface_band_K=_band(surface, best_A, limit_K),
         best_current_A=best_A,
         best_gain_K_per_s=-heat_W / cell.core_heat_capacity_J_per_K,
-        uniform_excess_K=float(-simulate_hold(domain, uniform, 0.0, 0.0, "core")),
+        uniform_excess_K=float(-simulate_hold(domain, uniform, 0.0, 0.0, Barrier.CORE)),
         overshoots=tuple(_overshoot(domain, time_s) for time_s in (domain.held_s, *HORIZONS_S)),
     )
 

@@ -12,6 +12,7 @@ from bms.arrays import Array
 from bms.barrier import BusQuantisation
 from bms.barrier.margins import soc_error_bound
 from bms.cell import CellState, Disturbance, integrate_step, terminal_voltage_V
+from bms.verification.barriers import Barrier
 from bms.verification.conditions import Condition, ReadingErrors, decided_conditions
 from bms.verification.decision import decide
 from bms.verification.domain import Domain, weights
@@ -49,19 +50,19 @@ def find_counter_example(
     domain: Domain,
     constants: Mapping[str, Any],
     errors: ReadingErrors,
-    barrier: str,
+    barrier: Barrier,
     rng: np.random.Generator,
 ) -> CounterExample | None:
     """The worst of many simulated decisions from the edge of the safe set; None when all are safe.
 
-    `barrier` is "core", "surface" or "voltage". States are drawn with that barrier at zero;
+    States are drawn with that barrier at zero;
     readings err to the side that lets most current through, disturbances are at the bounds that
     heat, and the current acts for the whole hold.
     """
     preset = domain.preset
     state, cooling_W = _edge_states(domain, barrier, rng)
     core_condition, surface_condition = decided_conditions(constants)
-    condition = surface_condition if barrier == "surface" else core_condition
+    condition = surface_condition if barrier is Barrier.SURFACE else core_condition
     slips = _favourable_errors(condition, errors)
     estimation_K = rng.choice([-1.0, 0.0, 1.0], state.soc.shape) * condition.error_bound_K
     soc_error = soc_error_bound(preset.cell, preset, BusQuantisation())
@@ -85,7 +86,7 @@ def find_counter_example(
         return None
     row = rows[worst]
     return CounterExample(
-        barrier=barrier,
+        barrier=barrier.value,
         soc=float(state.soc[row]),
         core_temperature_K=float(state.core_temperature_K[row]),
         surface_temperature_K=float(state.surface_temperature_K[row]),
@@ -103,7 +104,7 @@ def find_counter_example(
 
 
 def simulate_hold(
-    domain: Domain, state: CellState, current_A: Any, cooling_W: Any, barrier: str
+    domain: Domain, state: CellState, current_A: Any, cooling_W: Any, barrier: Barrier
 ) -> Any:
     """Smallest value of a barrier while a current is held from a state, at heating disturbances.
 
@@ -114,9 +115,9 @@ def simulate_hold(
     step_s = domain.held_s / SUB_STEPS
     # The first steps resolve the rise of the surface disturbance.
     rise_s = 2.0 * bounds.surface_K_per_s / max(bounds.surface_rate_K_per_s2, 1e-12)
-    steps_s = [rise_s] if barrier == "surface" and rise_s < step_s else []
+    steps_s = [rise_s] if barrier is Barrier.SURFACE and rise_s < step_s else []
     steps_s += [step_s] * SUB_STEPS
-    surface = -bounds.surface_K_per_s if barrier == "surface" else bounds.surface_K_per_s
+    surface = -bounds.surface_K_per_s if barrier is Barrier.SURFACE else bounds.surface_K_per_s
     lowest = _barrier(domain, state, current_A, surface, barrier)
     for length_s in steps_s:
         after = min(
@@ -138,19 +139,21 @@ def _upward(domain: Domain, surface: float) -> Disturbance:
 
 
 def _barrier(
-    domain: Domain, state: CellState, current_A: Any, surface_disturbance: float, barrier: str
+    domain: Domain, state: CellState, current_A: Any, surface_disturbance: float, barrier: Barrier
 ) -> Any:
     limits = domain.preset.limits
     soc, core_K, surface_K, coolant_K = state
-    if barrier == "core":
+    if barrier is Barrier.CORE:
         return limits.max_core_temperature_K - core_K
-    if barrier == "voltage":
+    if barrier is Barrier.VOLTAGE:
         return limits.max_voltage_V - terminal_voltage_V(domain.preset.cell, soc, current_A)
     best = domain.chain_value(surface_K, core_K - surface_K, surface_K - coolant_K)
     return best - domain.preset.uncertainty.surface_K_per_s - surface_disturbance
 
 
-def _edge_states(domain: Domain, barrier: str, rng: np.random.Generator) -> tuple[CellState, Array]:
+def _edge_states(
+    domain: Domain, barrier: Barrier, rng: np.random.Generator
+) -> tuple[CellState, Array]:
     """States of the domain with one barrier at zero (for the voltage: near its limit)."""
     limits, box, low, high = (
         domain.preset.limits, domain.preset.operating_box, domain.low, domain.high,
@@ -162,9 +165,9 @@ def _edge_states(domain: Domain, barrier: str, rng: np.random.Generator) -> tupl
     )
     core_gap = rng.uniform(-1.0, 20.0, SAMPLES)
     coolant_gap = rng.uniform(-2.0, 30.0, SAMPLES)
-    if barrier == "core":
+    if barrier is Barrier.CORE:
         core_gap = limits.max_core_temperature_K - surface_K
-    elif barrier == "surface":
+    elif barrier is Barrier.SURFACE:
         # psi = 0 solved for the coolant temperature; psi falls with the surface's rate.
         rest = domain.chain_value(surface_K, core_gap, 0.0)
         coolant_gap = rest / domain.surface_rate(0.0, 1.0)
@@ -177,7 +180,7 @@ def _edge_states(domain: Domain, barrier: str, rng: np.random.Generator) -> tupl
     inside &= (coolant_K <= box.coolant_temperature_K[1]) & (surface_K >= low.surface_K)
     # The chain must hold at the surface disturbance that the simulation starts with.
     inside &= domain.chain_value(surface_K, core_gap, coolant_gap) >= (
-        -1e-12 if barrier == "surface" else 2.0 * domain.preset.uncertainty.surface_K_per_s
+        -1e-12 if barrier is Barrier.SURFACE else 2.0 * domain.preset.uncertainty.surface_K_per_s
     )
     for flow in domain.flows:
         inside &= flow.rate(core_gap, coolant_gap) <= flow.largest

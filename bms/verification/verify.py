@@ -12,6 +12,8 @@ import numpy as np
 from bms.barrier.rounding import rounding_allowances
 from bms.model.model_file import KanModel
 from bms.presets import Preset
+from bms.verification.barriers import Barrier
+from bms.verification.certificate import Certificate
 from bms.verification.conditions import (
     chains,
     decided_conditions,
@@ -24,7 +26,7 @@ from bms.verification.electrical import certify_soc, certify_voltage
 from bms.verification.fallback import Fallback, infeasible_part
 from bms.verification.search import CounterExample, find_counter_example
 from bms.verification.slips import Slip, with_slips
-from bms.verification.thermal import Case, Certificate, certify
+from bms.verification.thermal import Case, certify
 
 LARGEST_BOXES = 400_000
 MARGINS = (
@@ -100,57 +102,61 @@ def verify(
     begin = time.monotonic()
     constants = with_slips(preset, firmware_constants(preset, model), slips)
     errors = reading_errors(preset)
-    core, surface = required_conditions(preset)
-    decided_core, decided_surface = decided_conditions(constants)
-    loose, strict = chains(preset)
-    core_rounding, surface_rounding = rounding_allowances(preset.cell, preset)
-    core_gain_per_s = preset.gains.core_gain_per_s(preset.cell)
-    core_case = Case("core", core, decided_core, core_gain_per_s, core_rounding)
-    cases = [
-        (certified_domain(preset, core, loose), core_case),
-        *(
-            (
-                certified_domain(preset, surface, chain),
-                Case("surface", surface, decided_surface, chain.second_per_s, surface_rounding),
-            )
-            for chain in (loose, strict)
-        ),
-    ]
+    cases = _thermal_cases(preset, constants)
+
+    def search(domain: Domain, barrier: Barrier) -> CounterExample | None:
+        return find_counter_example(domain, constants, errors, barrier, np.random.default_rng(0))
+
+    core_domain, surface_domain = cases[0][0], cases[1][0]
     voltage, _ = certify_voltage(preset, constants)
-    voltage_example = find_counter_example(
-        cases[0][0], constants, errors, "voltage", np.random.default_rng(0)
-    )
+    voltage_example = search(core_domain, Barrier.VOLTAGE)
     results = [
         BarrierResult("voltage", voltage, None, voltage_example, None),
         BarrierResult("soc", certify_soc(preset, constants), None, None, None),
-    ]
-    for domain, case in cases:
-        whole = replace(domain, flows=())
-        name = case.name
-        if name == "surface":
-            name = f"surface, psi = B4' + {domain.chain.first_per_s:.3g} B4"
-        results.append(
+        *(
             BarrierResult(
-                name,
+                _name(domain, case.barrier),
                 certify(domain, case, errors, largest_boxes),
                 domain,
-                *(
-                    find_counter_example(d, constants, errors, case.name, np.random.default_rng(0))
-                    for d in (domain, whole)
-                ),
+                search(domain, case.barrier),
+                search(replace(domain, flows=()), case.barrier),
             )
-        )
+            for domain, case in cases
+        ),
+    ]
     return Verification(
         preset=preset.name,
         model=model.hash[:8],
         slips=tuple(slip.name for slip in slips),
-        held_s=cases[0][0].held_s,
+        held_s=core_domain.held_s,
         error_bound_K=constants["estimation_error_bound_K"],
         margins={name: constants[name] for name in MARGINS},
         barriers=tuple(results),
-        fallback=infeasible_part(cases[1][0], (decided_core, decided_surface)),
+        fallback=infeasible_part(surface_domain, decided_conditions(constants)),
         wall_time_s=time.monotonic() - begin,
     )
+
+
+def _thermal_cases(preset: Preset, constants: Mapping[str, Any]) -> list[tuple[Domain, Case]]:
+    """The core barrier, then the surface barrier by both of its chains, with their domains."""
+    core, surface = required_conditions(preset)
+    decided_core, decided_surface = decided_conditions(constants)
+    core_rounding, surface_rounding = rounding_allowances(preset.cell, preset)
+    loose, strict = chains(preset)
+    gain_per_s = preset.gains.core_gain_per_s(preset.cell)
+    cases = [(loose, Case(Barrier.CORE, core, decided_core, gain_per_s, core_rounding))]
+    for chain in (loose, strict):
+        decay_per_s = chain.second_per_s
+        case = Case(Barrier.SURFACE, surface, decided_surface, decay_per_s, surface_rounding)
+        cases.append((chain, case))
+    return [(certified_domain(preset, case.required, chain), case) for chain, case in cases]
+
+
+def _name(domain: Domain, barrier: Barrier) -> str:
+    name: str = barrier.value
+    if barrier is Barrier.SURFACE:
+        return f"{name}, psi = B4' + {domain.chain.first_per_s:.3g} B4"
+    return name
 
 
 def _barrier_dict(result: BarrierResult) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bms.firmware._firmware import ffi
+from bms.firmware.image_checks import IMAGE_STATUS_NAMES
 
 _PARTS = {1: "application", 2: "calibration", 3: "boot stage"}
 _PART_FACTOR = 256
@@ -14,6 +14,10 @@ def refusal_text(model_hash: int) -> str:
     See firmware_c/boot/refusal.h.
     """
     part, status = divmod(model_hash, _PART_FACTOR)
-    names: dict[int, str] = ffi.typeof("image_status_t").elements
-    check = names.get(status, f"check {status}").removeprefix("IMAGE_").lower().replace("_", " ")
+    check = (
+        IMAGE_STATUS_NAMES.get(status, f"check {status}")
+        .removeprefix("IMAGE_")
+        .lower()
+        .replace("_", " ")
+    )
     return f"its boot stage refuses the {_PARTS.get(part, f'part {part}')} ({check}); flash it anew"

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json as json_format
-import os
+import json
 import sys
 import time
 from typing import Annotated
@@ -12,7 +11,9 @@ import typer
 from rich.console import Console
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands.options import DEFAULT_PROCESSES, JsonOption, PresetOption
 from bms.errors import InputError
+from bms.presets import DEFAULT_PRESET
 from hil_sim.commands import options
 from hil_sim.studies.bench.outcome import outcome_json
 from hil_sim.studies.bench.race import Clocks, WrongAnswerError
@@ -30,7 +31,7 @@ def bench(
         list[Section] | None,
         typer.Option("--section", help="Only this one. May be repeated. Default: all."),
     ] = None,
-    preset: options.PresetOption = options.DEFAULT_PRESET,
+    preset: PresetOption = DEFAULT_PRESET,
     quick: Annotated[
         bool,
         typer.Option("--quick", help="A first look in seconds; --bus virtual only by default."),
@@ -51,11 +52,8 @@ def bench(
             help="Size of a campaign. May be repeated. Default: 100, 1000 and 10000 (minutes).",
         ),
     ] = None,
-    jobs: Annotated[
-        int,
-        typer.Option("--jobs", min=1, help="Processes of a campaign. Default: one a core."),
-    ] = os.cpu_count() or 1,
-    json: options.JsonOption = False,
+    jobs: options.JobsOption = DEFAULT_PROCESSES,
+    as_json: JsonOption = False,
 ) -> int:
     """Time estimate, decision, control period, simulation and campaign in one run.
 
@@ -69,7 +67,7 @@ def bench(
     for name in buses:
         if not all(name.partition(":")):
             raise InputError(f"--bus '{name}': not interface:channel; write for example {BUSES[0]}")
-    shown = Console(stderr=True, quiet=json or not sys.stderr.isatty())
+    shown = Console(stderr=True, quiet=as_json or not sys.stderr.isatty())
     try:
         # A slow spinner, because it shares the processor with what is timed.
         with shown.status("", refresh_per_second=1) as status:
@@ -86,9 +84,9 @@ def bench(
     except WrongAnswerError as error:
         print(f"bms: {error}", file=sys.stderr)
         return EXIT_CHECK_FAILED
-    if json:
+    if as_json:
         chosen = {"preset": preset, "quick": quick}
-        print(json_format.dumps(chosen | outcome_json(result), indent=2))
+        print(json.dumps(chosen | outcome_json(result), indent=2))
     else:
         print_tables(Console(), result)
     return EXIT_DONE

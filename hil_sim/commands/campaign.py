@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json as json_format
-import os
+import json
 import sys
 import time
 from contextlib import AbstractContextManager, nullcontext
@@ -17,7 +16,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands.options import (
+    DEFAULT_PROCESSES,
+    JsonOption,
+    ModelOption,
+    PresetOption,
+    out_folder_option,
+    seed_option,
+)
 from bms.model.pair import load_pair
+from bms.presets import DEFAULT_PRESET
 from hil_sim.commands import options
 from hil_sim.run.workforce import Workforce, dask_workforce, local_workforce
 from hil_sim.studies.campaign.histogram import save_histograms
@@ -29,18 +37,13 @@ from hil_sim.studies.campaign.summary import firmware_is_safe, summarise
 
 def campaign(
     runs: Annotated[int, typer.Option("--runs", min=1, help="Number of cells to charge.")] = 1000,
-    jobs: Annotated[
-        int,
-        typer.Option("--jobs", min=1, help="Processes on this machine. Default: one a core."),
-    ] = os.cpu_count() or 1,
-    preset: options.PresetOption = options.DEFAULT_PRESET,
-    model: options.ModelOption = None,
-    seed: Annotated[
-        int, typer.Option("--seed", min=0, help="Seed of cells, disturbances and sensor noise.")
-    ] = 0,
+    jobs: options.JobsOption = DEFAULT_PROCESSES,
+    preset: PresetOption = DEFAULT_PRESET,
+    model: ModelOption = None,
+    seed: Annotated[int, seed_option("cells, disturbances and sensor noise")] = 0,
     max_time_s: options.MaxTimeOption = 3600.0,
     out: Annotated[
-        Path, typer.Option("--out", help="Folder for runs.csv, summary.json and histograms.png.")
+        Path, out_folder_option("runs.csv, summary.json and histograms.png", default=None)
     ] = Path("out/campaign"),
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the interrupted campaign in the folder.")
@@ -49,7 +52,7 @@ def campaign(
         str | None,
         typer.Option("--scheduler", help="Run on a Dask cluster, for example tcp://host:8786."),
     ] = None,
-    json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> int:
     """Charge many cells with KAN-rCBF, S-CBF and CC-CV and count crossed limits.
 
@@ -67,7 +70,7 @@ def campaign(
     with workforce as force:
         folder = CampaignFolder(out, settings, resume)
         start_s = time.perf_counter()
-        done = _run(settings, folder, force, quiet=json)
+        done = _run(settings, folder, force, quiet=as_json)
         wall_time_s = time.perf_counter() - start_s
     folder.finish()
     rows = folder.rows()
@@ -76,10 +79,10 @@ def campaign(
         "wall_time_s": round(wall_time_s, 3),
         "runs_per_s": round(done / wall_time_s, 3),
     }
-    folder.write("summary.json", json_format.dumps(summary, indent=2) + "\n")
+    folder.write("summary.json", json.dumps(summary, indent=2) + "\n")
     save_histograms(settings, rows, out / "histograms.png")
-    if json:
-        print(json_format.dumps(summary, indent=2))
+    if as_json:
+        print(json.dumps(summary, indent=2))
     else:
         _print(Console(), summary, out)
     return EXIT_DONE if firmware_is_safe(summary) else EXIT_CHECK_FAILED

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json as json_format
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,6 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands.options import JsonOption
 from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
@@ -51,19 +52,12 @@ def compare_targets(
             "--target", help=f"One of {', '.join(NAMES)}. May be repeated. Default: all of them."
         ),
     ] = None,
-    rows: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--rows",
-            help="Rows of the fault matrix whose name contains this; * and ? stand for others. "
-            "May be repeated. Default: all that can be played.",
-        ),
-    ] = None,
+    rows: options.RowsOption = None,
     seed: options.SeedOption = 0,
     build: Annotated[
         Path, typer.Option("--build", help="Folder that 'make firmware' writes to.")
     ] = BUILD,
-    json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> int:
     """Compare the firmware on other targets with that in this process, frame by frame.
 
@@ -88,14 +82,14 @@ def compare_targets(
         *columns,
         console=Console(stderr=True),
         transient=True,
-        disable=json or not sys.stderr.isatty(),
+        disable=as_json or not sys.stderr.isatty(),
     ) as bar:
         count = len(logs) if logs else 1 + len(playable)
         task = bar.add_task("runs", total=count * (len(targets) + (not logs)))
         scenarios = recorded or _recorded(seed, playable, bar, task)
         agreements = agreements_with_host(targets, scenarios, lambda: bar.advance(task))
-    if json:
-        print(json_format.dumps(_json(scenarios, agreements, left_out), indent=2))
+    if as_json:
+        print(json.dumps(_json(scenarios, agreements, left_out), indent=2))
     else:
         _print(Console(), scenarios, agreements, left_out)
     return EXIT_DONE if _is_equal(agreements) else EXIT_CHECK_FAILED

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json as json_format
+import json
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands.options import JsonOption, seed_option
 from bms.presets import DEFAULT_PRESET, load_preset
-from hil_sim.commands import options
 from hil_sim.report.folder import OutputFolder
 from hil_sim.studies.cost import CostReport, measure_cost
 from hil_sim.studies.cost.chart import cost_chart
@@ -28,7 +28,7 @@ def cost(
             help=f"Board: {' or '.join(BOARD_NAMES)}. May be repeated. Default: both of them.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of noise and search.")] = 0,
+    seed: Annotated[int, seed_option("sensor noise and search")] = 0,
     charges: Annotated[
         int, typer.Option("--charges", min=1, help="Random beginnings of charges in the search.")
     ] = 100,
@@ -45,7 +45,7 @@ def cost(
         Path | None,
         typer.Option("--out", dir_okay=False, help="PNG with the instructions over the charge."),
     ] = None,
-    json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> int:
     """Count instructions of estimate, decision and control period over a charge and a search.
 
@@ -66,8 +66,8 @@ def cost(
             picture = cost_chart(reports, preset.timing.sampling_period_s)
             folder.path(out.name).write_bytes(picture)
             folder.commit()
-    if json:
-        typer.echo(json_format.dumps([report.to_json() for report in reports], indent=1))
+    if as_json:
+        typer.echo(json.dumps([report.to_json() for report in reports], indent=1))
     else:
         _print(reports, charges, states)
     worst = max(report.costs["estimate_and_decision"].worst for report in reports)

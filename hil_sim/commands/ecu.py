@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from bms.commands.options import ModelOption, PresetOption
 from bms.firmware import Ecu
 from bms.presets import DEFAULT_PRESET
 from hil_sim.bus.buses import open_bus, require_shared
+from hil_sim.commands import options
 from hil_sim.commands.stopping import stop_event
 from hil_sim.nodes.clock import WallClock
 from hil_sim.nodes.ecu import EcuNode
@@ -17,17 +18,9 @@ from hil_sim.nodes.punctuality import Slots, TimeStatistics
 
 
 def ecu(
-    bus: Annotated[
-        str,
-        typer.Option("--bus", help="CAN bus as interface:channel, for example socketcan:vcan0."),
-    ],
-    preset: Annotated[
-        str, typer.Option("--preset", help="Name of a shipped preset, or path of a TOML file.")
-    ] = DEFAULT_PRESET,
-    model: Annotated[
-        Path | None,
-        typer.Option("--model", help="JSON model of the estimator. Default: the preset's own."),
-    ] = None,
+    bus: options.SharedBusOption,
+    preset: PresetOption = DEFAULT_PRESET,
+    model: ModelOption = None,
     realtime: Annotated[
         bool,
         typer.Option("--realtime", help="Step by the wall clock instead of on SYNC frames."),

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json as json_format
-import os
+import json
 import sys
 import time
 from contextlib import nullcontext
@@ -19,8 +18,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands.options import (
+    DEFAULT_PROCESSES,
+    JsonOption,
+    ModelOption,
+    PresetOption,
+    out_folder_option,
+)
 from bms.errors import InputError
 from bms.model.pair import load_pair
+from bms.presets import DEFAULT_PRESET
 from hil_sim.commands import options
 from hil_sim.fault_matrix.matrix import Row, load_matrix
 from hil_sim.fault_matrix.report import (
@@ -38,35 +45,20 @@ from hil_sim.report.folder import OutputFolder
 
 def fault_matrix(
     bus: options.BusOption = "virtual:faults",
-    preset: options.PresetOption = options.DEFAULT_PRESET,
-    model: options.ModelOption = None,
+    preset: PresetOption = DEFAULT_PRESET,
+    model: ModelOption = None,
     seed: options.SeedOption = 0,
-    rows: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--rows",
-            help="Rows whose name contains this; * and ? stand for others. May be repeated. "
-            "Default: all.",
-        ),
-    ] = None,
+    rows: options.RowsOption = None,
     matrix: Annotated[
         Path | None,
         typer.Option("--matrix", help="TOML file of rows. Default: the matrix of the project."),
     ] = None,
-    jobs: Annotated[
-        int,
-        typer.Option("--jobs", min=1, help="Rows at a time on a virtual bus. Default: one a core."),
-    ] = os.cpu_count() or 1,
+    jobs: options.JobsOption = DEFAULT_PROCESSES,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            help="Folder for fault-matrix.html, .json and junit.xml. Default: nothing is written.",
-        ),
+        out_folder_option("fault-matrix.html, fault-matrix.json and junit.xml"),
     ] = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="Print the result as JSON and nothing else.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> int:
     """Play every row of the fault matrix and compare reaction, deadline and limits.
 
@@ -82,13 +74,13 @@ def fault_matrix(
         start_s = time.perf_counter()
         verdicts = _play(settings, chosen, jobs)
         result = MatrixResult(settings, verdicts, time.perf_counter() - start_s)
-        content = json_format.dumps(matrix_json(result), indent=2) + "\n"
+        content = json.dumps(matrix_json(result), indent=2) + "\n"
         if folder is not None:
             folder.path("fault-matrix.json").write_text(content, encoding="utf-8")
             folder.path("junit.xml").write_text(matrix_junit(result), encoding="utf-8")
             folder.path("fault-matrix.html").write_text(matrix_page(result), encoding="utf-8")
             folder.commit()
-    if json:
+    if as_json:
         print(content, end="")
     else:
         _print(Console(), result, out)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json as json_module
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from bms.commands.options import JsonOption
 from bms.errors import InputError
-from hil_sim.commands import options
 from hil_sim.commands.stopping import stop_event
 from hil_sim.targets import Emulation, Flash
 from hil_sim.targets.catalog import BOARD_NAMES, board_name
@@ -47,7 +47,7 @@ def flash(
     start: Annotated[
         bool, typer.Option("--start/--no-start", help="Start the board until Ctrl-C or SIGTERM.")
     ] = True,
-    json: options.JsonOption = False,
+    as_json: JsonOption = False,
 ) -> int:
     """Program the emulated flash of a board, then run the board until Ctrl-C or SIGTERM.
 
@@ -71,11 +71,11 @@ def flash(
         "preset_hash": f"{present.preset_hash:08x}",
     }
     if not start:
-        _print(report, json)
+        _print(report, as_json)
         return 0
     stop = stop_event()
     with Emulation(memory.path, board, port, log) as emulation:
-        _print({**report, "bus": emulation.bus}, json)
+        _print({**report, "bus": emulation.bus}, as_json)
         while emulation.is_running and not stop.wait(_POLL_S):
             pass
         ended = not emulation.is_running and not stop.is_set()
@@ -86,7 +86,7 @@ def flash(
 
 def _print(report: dict[str, str | int], as_json: bool) -> None:
     if as_json:
-        print(json_module.dumps(report), flush=True)
+        print(json.dumps(report), flush=True)
         return
     print(
         "{flash}: firmware version {firmware_version} ({application_length_bytes} bytes), model "

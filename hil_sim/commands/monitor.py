@@ -10,8 +10,10 @@ import typer
 from rich.console import Console
 from rich.live import Live
 
+from bms.commands.options import preset_option
 from hil_sim.bus.buses import require_shared
 from hil_sim.bus.database import load_codecs
+from hil_sim.commands import options
 from hil_sim.commands.stopping import stop_event
 from hil_sim.monitor.keyboard import Keyboard
 from hil_sim.monitor.listener import Listener
@@ -27,16 +29,10 @@ LINE_REFRESH_S = 1.0
 
 
 def monitor(
-    bus: Annotated[
-        str,
-        typer.Option("--bus", help="CAN bus as interface:channel, for example socketcan:vcan0."),
-    ],
+    bus: options.SharedBusOption,
     preset: Annotated[
         str | None,
-        typer.Option(
-            "--preset",
-            help="Preset of the ECU, for its limits. Default: the shipped one that the ECU names.",
-        ),
+        preset_option("Preset of the ECU, for its limits", "the shipped one that the ECU names"),
     ] = None,
     for_s: Annotated[
         float | None,

@@ -1,4 +1,4 @@
-"""Options that several commands share."""
+"""Options that several commands of the simulator share; bms.commands.options has the others."""
 
 from __future__ import annotations
 
@@ -7,27 +7,14 @@ from typing import Annotated
 
 import typer
 
-from bms.presets import DEFAULT_PRESET
+from bms.commands.options import out_folder_option, processes_option, seed_option
 from hil_sim.plant.disturbances import DisturbanceKind
 
-PresetOption = Annotated[
-    str, typer.Option("--preset", help="Name of a shipped preset, or path of a TOML file.")
-]
-ModelOption = Annotated[
-    Path | None,
-    typer.Option("--model", help="JSON model of the estimator. Default: the preset's own."),
-]
-BusOption = Annotated[
-    str,
-    typer.Option(
-        "--bus",
-        help="CAN bus as interface:channel in python-can's terms, e.g. virtual:bms, "
-        "socketcan:vcan0.",
-    ),
-]
-SeedOption = Annotated[
-    int, typer.Option("--seed", min=0, help="Seed of sensor noise and disturbance.")
-]
+_BUS_FORM = "CAN bus as interface:channel in python-can's terms, e.g."
+
+BusOption = Annotated[str, typer.Option("--bus", help=f"{_BUS_FORM} virtual:bms, socketcan:vcan0.")]
+SharedBusOption = Annotated[str, typer.Option("--bus", help=f"{_BUS_FORM} socketcan:vcan0.")]
+SeedOption = Annotated[int, seed_option("sensor noise and disturbance")]
 DisturbanceOption = Annotated[
     DisturbanceKind,
     typer.Option(
@@ -37,12 +24,7 @@ DisturbanceOption = Annotated[
     ),
 ]
 OutOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--out",
-        help="Folder for summary.json, report.html, charge.png and can.log. "
-        "Default: nothing is written.",
-    ),
+    Path | None, out_folder_option("summary.json, report.html, charge.png and can.log")
 ]
 LogOption = Annotated[
     Path | None,
@@ -51,9 +33,6 @@ LogOption = Annotated[
         help="Record the bus to this file too: .log, .asc, .csv (also .gz), .blf or .mf4. "
         "Default: nothing but can.log in --out.",
     ),
-]
-JsonOption = Annotated[
-    bool, typer.Option("--json", help="Print the summary as JSON and nothing else.")
 ]
 RealtimeOption = Annotated[
     bool, typer.Option("--realtime", help="Run on the wall clock instead of virtual time.")
@@ -68,18 +47,12 @@ MaxTimeOption = Annotated[
     float,
     typer.Option("--max-time-s", min=0.1, help="End of the run in s after the charge began."),
 ]
-
-__all__ = [
-    "DEFAULT_PRESET",
-    "BusOption",
-    "DisturbanceOption",
-    "FaultsOption",
-    "JsonOption",
-    "LogOption",
-    "MaxTimeOption",
-    "ModelOption",
-    "OutOption",
-    "PresetOption",
-    "RealtimeOption",
-    "SeedOption",
+JobsOption = Annotated[int, processes_option("--jobs")]
+RowsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--rows",
+        help="Rows of the fault matrix whose name contains this; * and ? stand for others. "
+        "May be repeated. Default: all.",
+    ),
 ]

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from bms.presets import load_preset
+from bms.commands.options import JsonOption, PresetOption
+from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.commands import options
 from hil_sim.commands.outcome import charge_and_report, charge_settings
 from hil_sim.plant.disturbances import DisturbanceKind
@@ -15,14 +16,14 @@ from hil_sim.run.session import run_plant
 
 
 def plant(
-    bus: options.BusOption,
-    preset: options.PresetOption = options.DEFAULT_PRESET,
+    bus: options.SharedBusOption,
+    preset: PresetOption = DEFAULT_PRESET,
     seed: options.SeedOption = 0,
     disturbance: options.DisturbanceOption = DisturbanceKind.NONE,
     faults: options.FaultsOption = None,
     out: options.OutOption = None,
     log: options.LogOption = None,
-    json: options.JsonOption = False,
+    as_json: JsonOption = False,
     realtime: options.RealtimeOption = False,
     max_time_s: options.MaxTimeOption = 3600.0,
     answer_timeout_s: Annotated[
@@ -45,4 +46,4 @@ def plant(
         load_preset(preset), bus, seed, disturbance, faults, max_time_s, realtime
     )
     settings = replace(settings, answer_timeout_s=answer_timeout_s)
-    return charge_and_report(settings, run_plant, out, json, log=log)
+    return charge_and_report(settings, run_plant, out, as_json, log=log)

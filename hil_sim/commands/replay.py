@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json as json_format
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -10,9 +10,9 @@ import typer
 from rich.console import Console
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands.options import JsonOption, model_option, preset_option
 from bms.errors import InputError
 from bms.firmware import Ecu
-from hil_sim.commands.options import JsonOption
 from hil_sim.commands.replay_output import ReplayReport, builds_json, print_builds
 from hil_sim.logs import usable_format
 from hil_sim.replay.builds import compare_builds, logs_in
@@ -35,11 +35,11 @@ def replay(
     ],
     preset: Annotated[
         str | None,
-        typer.Option("--preset", help="Preset of the ECU. Default: the one that the log names."),
+        preset_option("Preset of the ECU", "the one that the log names"),
     ] = None,
     model: Annotated[
         Path | None,
-        typer.Option("--model", help="Model of the estimator. Default: the one the log names."),
+        model_option("Model of the estimator", "the one that the log names"),
     ] = None,
     out: Annotated[
         Path | None,
@@ -52,7 +52,7 @@ def replay(
             help="Compare two builds made by 'python -m bms.native_build' on a folder of logs.",
         ),
     ] = None,
-    json: JsonOption = False,
+    as_json: JsonOption = False,
 ) -> int:
     """Feed the frames of a log to the firmware in virtual time and compare its decisions.
 
@@ -65,11 +65,13 @@ def replay(
     if against is not None:
         if out is not None:
             raise InputError("--out: there are two answers with --against; leave one of them out")
-        return _against(against, log, preset, model, json)
-    return _replay(log, preset, model, out, json)
+        return _against(against, log, preset, model, as_json)
+    return _replay(log, preset, model, out, as_json)
 
 
-def _replay(log: Path, preset: str | None, model: Path | None, out: Path | None, json: bool) -> int:
+def _replay(
+    log: Path, preset: str | None, model: Path | None, out: Path | None, as_json: bool
+) -> int:
     if out is not None:
         usable_format(out)
     recording = load_recording(log)
@@ -94,19 +96,19 @@ def _replay(log: Path, preset: str | None, model: Path | None, out: Path | None,
         model_hash=ecu.model.hash[:8],
         is_identity_compared=not ignored,
     )
-    if json:
-        print(json_format.dumps(report.to_json(), indent=2))
+    if as_json:
+        print(json.dumps(report.to_json(), indent=2))
     else:
         report.print(Console())
     return EXIT_DONE if comparison.is_equal else EXIT_CHECK_FAILED
 
 
 def _against(
-    builds: tuple[Path, Path], folder: Path, preset: str | None, model: Path | None, json: bool
+    builds: tuple[Path, Path], folder: Path, preset: str | None, model: Path | None, as_json: bool
 ) -> int:
     verdicts = compare_builds(builds, logs_in(folder), preset, model)
-    if json:
-        print(json_format.dumps(builds_json(builds, verdicts), indent=2))
+    if as_json:
+        print(json.dumps(builds_json(builds, verdicts), indent=2))
     else:
         print_builds(Console(), builds, verdicts)
     is_equal = all(verdict.comparison.is_equal for verdict in verdicts)

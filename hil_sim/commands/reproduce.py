@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json as json_format
-import os
+import json
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
-import typer
 from rich import box
 from rich.console import Console
 from rich.markup import escape
@@ -18,6 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands.options import DEFAULT_PROCESSES, JsonOption, out_folder_option
 from bms.presets import Preset, load_preset
 from hil_sim.commands import options
 from hil_sim.report.folder import OutputFolder
@@ -29,20 +28,11 @@ from hil_sim.studies.reproduction.sections import BAD, Section, passed, sections
 def reproduce(
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            help="Folder for report.html, reproduce.json, reproduce.csv and the pictures. "
-            "Default: nothing is written.",
-        ),
+        out_folder_option("report.html, reproduce.json, reproduce.csv and the pictures"),
     ] = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="Print the result as JSON and nothing else.")
-    ] = False,
+    as_json: JsonOption = False,
     seed: options.SeedOption = 0,
-    jobs: Annotated[
-        int | None,
-        typer.Option("--jobs", min=1, help="Charges at a time. Default: one for each processor."),
-    ] = None,
+    jobs: options.JobsOption = DEFAULT_PROCESSES,
     max_time_s: options.MaxTimeOption = 3600.0,
 ) -> int:
     """Run the paper's comparison on both presets and show its figures beside ours.
@@ -55,12 +45,12 @@ def reproduce(
     """
     cases, presets = all_cases(), [load_preset(name) for name in PRESETS]
     with OutputFolder(out) if out is not None else nullcontext() as folder:
-        results = _run(cases, seed, jobs or os.cpu_count() or 1, max_time_s)
+        results = _run(cases, seed, jobs, max_time_s)
         if folder is not None:
             write_reproduction(folder, presets, results, seed)
             folder.commit()
-    if json:
-        print(json_format.dumps(content_json(presets, results, seed), indent=2))
+    if as_json:
+        print(json.dumps(content_json(presets, results, seed), indent=2))
     else:
         _print(Console(), presets, results, out)
     return EXIT_DONE if passed(results) else EXIT_CHECK_FAILED

@@ -8,9 +8,10 @@ from typing import Annotated
 
 import typer
 
+from bms.commands.options import JsonOption, ModelOption, PresetOption
 from bms.errors import InputError
 from bms.model.pair import load_pair
-from bms.presets import load_preset
+from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.bus.buses import is_serial_line
 from hil_sim.commands import options
 from hil_sim.commands.outcome import charge_and_report, charge_settings
@@ -29,8 +30,8 @@ def sil(
         ControllerKind | None,
         typer.Option("--baseline", help="Run this one too and show it beside the controller."),
     ] = None,
-    preset: options.PresetOption = options.DEFAULT_PRESET,
-    model: options.ModelOption = None,
+    preset: PresetOption = DEFAULT_PRESET,
+    model: ModelOption = None,
     bus: options.BusOption = Settings.bus,
     target: Annotated[
         str | None,
@@ -45,7 +46,7 @@ def sil(
     faults: options.FaultsOption = None,
     out: options.OutOption = None,
     log: options.LogOption = None,
-    json: options.JsonOption = False,
+    as_json: JsonOption = False,
     realtime: options.RealtimeOption = False,
     max_time_s: options.MaxTimeOption = 3600.0,
 ) -> int:
@@ -84,4 +85,4 @@ def sil(
         )
         own_bus = Settings.bus if is_remote else bus
         second = None if baseline is None else replace(settings, controller=baseline, bus=own_bus)
-        return charge_and_report(settings, run_sil, out, json, second, log)
+        return charge_and_report(settings, run_sil, out, as_json, second, log)

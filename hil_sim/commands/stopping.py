@@ -1,4 +1,4 @@
-"""How a command that runs until it is told to stop hears of that."""
+"""The end of a command that runs until SIGTERM or Ctrl-C."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from threading import Event
 
 
 def stop_event() -> Event:
-    """Set by SIGTERM and Ctrl-C from now on, in place of an end of the process."""
+    """An event that SIGTERM and Ctrl-C set from now on, instead of ending the process."""
     stop = Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from bms.bounds.derive import SEARCH_SPREAD_K, bounds_for_recording, error_bound_parts_K
+from bms.data.datasets import split_by_time
 from bms.data.measurements import read_measurements
-from bms.model.make import split_by_time
 from bms.model.model_file import load_model, load_shipped_model, save_model, shipped_model_path
 from bms.presets import preset_names
 from tests.bms.kan_samples import write_recording

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from bms.barrier import BusQuantisation
+from bms.bounds.readings import measurement_error_K
 from bms.data.datasets import simulated_split
 from bms.data.simulate import Samples, joined
 from bms.errors import InputError
-from bms.kan.accuracy import error_figures, measurement_error_K
+from bms.kan.accuracy import error_figures
 from bms.kan.settings import TrainingSettings
 from bms.kan.training import train_network
 from bms.model.make import model_for_measurements, model_for_preset

@@ -189,7 +189,7 @@ def test_values_are_replaced_in_their_section_and_nothing_else_changes(tmp_path)
         with_values(text, {("limits", "soc"): 0.5})
 
 
-def calibration(*arguments):
+def paper_fit(*arguments):
     return subprocess.run(
         [sys.executable, "-m", "bms.studies.paper_fit", *arguments],
         capture_output=True,
@@ -200,7 +200,7 @@ def calibration(*arguments):
 
 
 def test_the_command_compares_every_figure_without_a_search():
-    done = calibration("--generations", "0")
+    done = paper_fit("--generations", "0")
     assert done.returncode == 0
     for figure in FIGURES:
         (line,) = (line for line in done.stdout.splitlines() if figure.name in line)
@@ -210,7 +210,7 @@ def test_the_command_compares_every_figure_without_a_search():
 
 
 def test_the_command_refuses_an_unknown_preset_in_one_line():
-    done = calibration("--preset", "unheard-of", "--generations", "0")
+    done = paper_fit("--preset", "unheard-of", "--generations", "0")
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "unheard-of" in done.stderr
@@ -218,7 +218,7 @@ def test_the_command_refuses_an_unknown_preset_in_one_line():
 
 def test_the_command_names_a_file_that_cannot_be_written_in_one_line(tmp_path):
     target = tmp_path / "absent" / "fitted.toml"
-    done = calibration("--generations", "0", "--out", str(target))
+    done = paper_fit("--generations", "0", "--out", str(target))
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert str(target) in done.stderr

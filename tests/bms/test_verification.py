@@ -21,6 +21,7 @@ from bms.firmware import Firmware
 from bms.model.pair import load_pair
 from bms.presets import load_preset, preset_names
 from bms.verification import SLIPS, Verification, verify
+from bms.verification.barriers import Barrier
 from bms.verification.conditions import (
     chains,
     decided_conditions,
@@ -134,7 +135,7 @@ def test_a_quarter_of_a_margin_is_not_certified(name, margin):
     chain = chains(preset)[1]
     decay_per_s = preset.gains.core_gain_per_s(preset.cell) if index == 0 else chain.second_per_s
     case = Case(
-        ("core", "surface")[index],
+        (Barrier.CORE, Barrier.SURFACE)[index],
         condition,
         decided_conditions(constants)[index],
         decay_per_s,

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bms.firmware._firmware import ffi, lib
 
+from bms.firmware._firmware import ffi, lib
 from codegen.can_database import data_ids, load_database, number_attribute
 from codegen.can_document import can_document
 

@@ -11,8 +11,8 @@ from statistics import median
 from typing import Any
 
 import pytest
-from bms.firmware._firmware import lib
 
+from bms.firmware._firmware import lib
 from hil_sim.bus.buses import Frame, open_bus
 from hil_sim.bus.database import load_codecs
 from hil_sim.bus.e2e import Receiver

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from bms.firmware._firmware import lib
 
 from bms.errors import ModelMismatchError
 from bms.firmware import Firmware
+from bms.firmware._firmware import lib
 from bms.firmware.calibration import calibration_block
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET, preset_path

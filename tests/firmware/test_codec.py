@@ -6,11 +6,11 @@ import math
 import re
 
 import pytest
-from bms.firmware._firmware import ffi, lib
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bms.barrier import BusQuantisation
+from bms.firmware._firmware import ffi, lib
 from codegen.can_database import load_database
 from codegen.can_sources import can_sources
 

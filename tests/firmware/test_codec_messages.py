@@ -6,11 +6,11 @@ import math
 from typing import Any
 
 import pytest
-from bms.firmware._firmware import ffi, lib
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bms.firmware import Ecu
+from bms.firmware._firmware import ffi, lib
 from tests.firmware.bench import DATABASE, HEALTHY, frame
 
 SINGLE = st.floats(width=32)

@@ -7,11 +7,11 @@ from typing import Any
 
 import cantools.autosar
 import pytest
-from bms.firmware._firmware import ffi, lib
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bms.firmware import Ecu
+from bms.firmware._firmware import ffi, lib
 from codegen.can_database import data_ids
 from tests.firmware.bench import DATABASE, HEALTHY, MEASURED, frame
 

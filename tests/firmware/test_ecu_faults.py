@@ -8,8 +8,8 @@ from itertools import combinations
 from typing import Any
 
 import pytest
-from bms.firmware._firmware import ffi, lib
 
+from bms.firmware._firmware import ffi, lib
 from tests.firmware.bench import DATABASE, HEALTHY, MEASURED, Bench, frame
 
 NOT_AVAILABLE = {

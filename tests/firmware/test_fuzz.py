@@ -7,8 +7,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from bms.firmware._firmware import lib
 
+from bms.firmware._firmware import lib
 from tests.firmware.native.build import ROOT, build_program
 
 FRAMES = 2_000_000

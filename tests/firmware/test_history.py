@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bms.firmware._firmware import ffi, lib
 
 from bms.data.lags import Lag
 from bms.data.measurements import Measurements
 from bms.firmware import Ecu
+from bms.firmware._firmware import ffi, lib
 from bms.model.model_file import shipped_model_path
 from tests.firmware.bench import READY_PERIODS, Bench
 

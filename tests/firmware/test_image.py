@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bms.firmware._firmware import ffi, lib
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bms.firmware._firmware import ffi, lib
 from bms.image import MEMORY_MAP, TARGETS, Header, calibration_of, calibration_part, check_image
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET

@@ -9,7 +9,9 @@ from typing import Any
 import pytest
 
 from bms.errors import InputError
+from bms.firmware.image_checks import IMAGE_OK, IMAGE_STATUS_NAMES
 from bms.image import Header, check_image
+from bms.image.check import REASONS
 from tests.firmware.damaged_images import (
     APPLICATION,
     BOARD,
@@ -68,6 +70,10 @@ def host_takes(content: bytes) -> bool:
         assert "\n" not in str(error) and "; " in str(error), "one line with a remedy"
         return False
     return True
+
+
+def test_every_finding_of_the_boot_stage_has_its_words() -> None:
+    assert set(REASONS) == set(IMAGE_STATUS_NAMES.values()) - {IMAGE_OK}
 
 
 def test_the_image_as_built_is_taken(boot_stage: BootStage) -> None:

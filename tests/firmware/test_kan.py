@@ -97,7 +97,7 @@ def test_stated_table_error_holds_over_every_edge(preset: str) -> None:
     network = load_shipped_model(preset).network
     tables = network_tables(network)
     assert tables.error_bound_K <= 1e-4
-    edges = [edge for layer in network.layers for row in layer for edge in row]
+    edges = network.edges
     for edge, table in zip(edges, tables.edges):
         x = np.linspace(table.knots[0], table.knots[-1], 10_001)
         cell = np.clip(np.searchsorted(table.knots, x, side="right") - 1, 0, tables.cells - 1)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import cantools.autosar
 import pytest
-from bms.firmware._firmware import ffi, lib
 
 from bms.firmware import Reception, ReceptionCounts
+from bms.firmware._firmware import ffi, lib
 from codegen.can_database import data_ids, load_database, number_attribute
 
 DATABASE = load_database()

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+
 from bms.firmware._firmware import ffi, lib
 
 CAPACITY_AS, PERIOD_S = 8280.0, np.float32(0.1)

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
-from bms.firmware._firmware import ffi, lib
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bms.firmware._firmware import ffi, lib
 from bms.presets import load_preset
 from codegen.can_database import load_database, number_attribute
 from hil_sim.plant.charger import Charger

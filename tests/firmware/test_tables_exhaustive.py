@@ -18,7 +18,7 @@ from bms.firmware.edges import CompiledEdges
 from bms.kan.network import Network
 from bms.model.model_file import load_model, save_model, shipped_models
 from bms.tables.rounding import arithmetic_error_K, edge_error_bounds
-from bms.verification.exhaustive import EdgeSweep, check_network, edges_of
+from bms.verification.exhaustive import EdgeSweep, check_network
 from tests.firmware.test_kan import box_points, random_model
 
 MODELS = pytest.mark.parametrize("path", shipped_models(), ids=lambda path: path.stem)
@@ -30,7 +30,7 @@ SHAPES = st.sampled_from(
 
 def nudged(network: Network, number: int, change: float) -> Network:
     """The network with one spline coefficient of one edge changed."""
-    edges = iter(range(len(edges_of(network))))
+    edges = iter(range(len(network.edges)))
 
     def edge(old):
         if next(edges) != number:
@@ -45,7 +45,7 @@ def test_bounds_of_all_shipped_models_hold(bms):
     code, out, _ = bms("verify-tables", "--stride", STRIDE, "--json")
 
     result = json.loads(out)
-    edges = sum(len(edges_of(load_model(path).network)) for path in shipped_models())
+    edges = sum(len(load_model(path).network.edges) for path in shipped_models())
     assert code == 0
     assert len(result["edges"]) == edges
     for row in result["edges"]:
@@ -91,7 +91,7 @@ def test_grid_that_is_shifted_by_a_little_more_than_its_tolerance_shows_in_the_f
     hidden = network.layers[-1][0][0]
     shifted = replace(hidden, knots=tuple(knot + 3e-6 for knot in hidden.knots))
     layers = (*network.layers[:-1], ((shifted,),))
-    last = len(edges_of(network)) - 1
+    last = len(network.edges) - 1
 
     check = EdgeSweep(network, last, CompiledEdges(replace(network, layers=layers))).check_some(
         2**21 + 1
@@ -112,7 +112,7 @@ def test_quick_reference_is_the_edge_itself(path):
         *random.integers(0, 2**15, 20) * 2**16,  # any magnitude
         0x7F80_0000,  # infinity, then NaNs
     ]
-    for number in range(len(edges_of(network))):
+    for number in range(len(network.edges)):
         sweep = EdgeSweep(network, number)
         for first in [*firsts, *(2**31 + int(first) for first in firsts)]:
             patterns = np.arange(first, int(first) + 2**16, 31).astype(np.uint32)

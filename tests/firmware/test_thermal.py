@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bms.firmware._firmware import ffi, lib
 
 from bms.barrier import BusQuantisation
 from bms.barrier.surface_prediction import surface_prediction
 from bms.cell import CellState, Disturbance, integrate_step
 from bms.firmware import Ecu
+from bms.firmware._firmware import ffi, lib
 from bms.presets import Preset, load_preset
 
 PRESETS = ("lin2014", "paper_calibrated")

@@ -172,7 +172,7 @@ def test_a_core_limit_raised_by_2_K_is_caught(tmp_path):
 def test_the_exit_code_tells(tmp_path, monkeypatch, capsys, changes, code):
     broken = partial(CampaignSettings, firmware_changes=changes)
     monkeypatch.setattr(command, "CampaignSettings", broken)
-    assert command.campaign(runs=8, jobs=1, out=tmp_path, json=True) == code
+    assert command.campaign(runs=8, jobs=1, out=tmp_path, as_json=True) == code
     printed = json.loads(capsys.readouterr().out)
     assert printed == json.loads((tmp_path / "summary.json").read_text())
     assert printed["runs_in_this_session"] == 8

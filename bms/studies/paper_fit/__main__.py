@@ -30,7 +30,11 @@ from bms.validation import read_text
 
 def run(
     preset: Annotated[
-        str, typer.Option("--preset", help="Preset to begin from: name or .toml file.")
+        str,
+        typer.Option(
+            "--preset",
+            help="Preset to begin from: name of a shipped one, or path of a TOML file.",
+        ),
     ] = DEFAULT_PRESET,
     out: Annotated[
         Path | None, typer.Option("--out", help="Fitted preset to write (TOML).")
@@ -116,5 +120,5 @@ if __name__ == "__main__":
     try:
         typer.run(run)
     except BmsError as error:
-        sys.stderr.write(f"calibration: {error}\n")
+        sys.stderr.write(f"paper_fit: {error}\n")
         sys.exit(2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -119,6 +120,56 @@ def figures_of(robust: Charge, surface: Charge) -> Array:
     )
 
 
+@dataclasses.dataclass(frozen=True)
+class Misfit:
+    """How far candidates are from the paper's figures; a candidate is a point of the unit cube.
+
+    The misfit is the sum of fourth powers of the differences in units of each figure's tolerance,
+    so that the worst counts most. Two wishes count like figures, because many cells fit: a derated
+    current does not grow again, as the paper's does not, and the core can be estimated well.
+    """
+
+    preset: Preset
+    error_bound_K: float | None
+
+    def values(self, points: Array) -> Array:
+        """Parameters of candidates (9, N)."""
+        logarithmic = np.array([parameter.logarithmic for parameter in FREE_PARAMETERS])
+        bounds = np.array([(parameter.low, parameter.high) for parameter in FREE_PARAMETERS])
+        bounds[logarithmic] = np.log(bounds[logarithmic])
+        low, span = bounds[:, 0], bounds[:, 1] - bounds[:, 0]
+        scaled = low[:, None] + span[:, None] * points
+        physical: Array = np.where(logarithmic[:, None], np.exp(scaled), scaled)
+        return physical
+
+    def residuals(self, points: Array, period_s: float) -> Array:
+        """Signed squares of figures' differences and wishes, (9, N); their squares are summed."""
+        cell, start = candidates(self.preset.cell, self.values(points))
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            robust, surface = both_charges(self.preset, cell, start, self.error_bound_K, period_s)
+        wishes = (
+            np.maximum(robust.regrowth_A, surface.regrowth_A) / _REGROWTH_TOLERANCE_A,
+            expected_error_bound_K(cell) / _ERROR_TOLERANCE_K,
+        )
+        differences = [
+            (ours - figure.paper) / figure.tolerance
+            for figure, ours in zip(FIGURES, figures_of(robust, surface))
+        ]
+        capped: Array = np.clip(
+            np.nan_to_num([*differences, *wishes], nan=_MISFIT_CAP), -_MISFIT_CAP, _MISFIT_CAP
+        )
+        return capped * np.abs(capped)
+
+    def jacobian(self, point: Array, period_s: float) -> Array:
+        """Central differences of the residuals at one candidate (9,), within the unit cube."""
+        step = _POLISH_STEP * np.eye(len(point))
+        above = np.clip(point[:, None] + step, 0.0, 1.0)
+        below = np.clip(point[:, None] - step, 0.0, 1.0)
+        change = self.residuals(np.hstack([above, below]), period_s)
+        width = np.diagonal(above - below)
+        return (change[:, : len(point)] - change[:, len(point) :]) / width
+
+
 def fit(
     preset: Preset,
     error_bound_K: float | None,
@@ -128,48 +179,23 @@ def fit(
 ) -> Array:
     """Values of FREE_PARAMETERS with the least misfit, of shape (9,).
 
-    Differential evolution over the whole ranges, then least squares from its best. The misfit is
-    the sum of fourth powers of the differences in units of each figure's tolerance, so that the
-    worst counts most. Two wishes count like figures, because many cells fit: a derated current
-    does not grow again, as the paper's does not, and the core can be estimated well.
+    Differential evolution over the whole ranges, then least squares from its best. `on_generation`
+    gets the number of each generation, from 1, and its least misfit.
     """
-    logarithmic = np.array([parameter.logarithmic for parameter in FREE_PARAMETERS])
-    bounds = np.array([(parameter.low, parameter.high) for parameter in FREE_PARAMETERS])
-    bounds[logarithmic] = np.log(bounds[logarithmic])
-    low, span = bounds[:, 0], bounds[:, 1] - bounds[:, 0]
+    misfit = Misfit(preset, error_bound_K)
+    point = _polished(misfit, _searched(misfit, seed, generations, on_generation))
+    return misfit.values(point[:, None])[:, 0]
 
-    def values(shares: Array) -> Array:
-        """From the unit cube (9, N) to parameters."""
-        scaled = low[:, None] + span[:, None] * shares
-        physical: Array = np.where(logarithmic[:, None], np.exp(scaled), scaled)
-        return physical
 
-    def differences(shares: Array, period_s: float) -> Array:
-        cell, start = candidates(preset.cell, values(shares))
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            robust, surface = both_charges(preset, cell, start, error_bound_K, period_s)
-        wishes = (
-            np.maximum(robust.regrowth_A, surface.regrowth_A) / _REGROWTH_TOLERANCE_A,
-            expected_error_bound_K(cell) / _ERROR_TOLERANCE_K,
-        )
-        misfits = [
-            (ours - figure.paper) / figure.tolerance
-            for figure, ours in zip(FIGURES, figures_of(robust, surface))
-        ]
-        capped: Array = np.clip(
-            np.nan_to_num([*misfits, *wishes], nan=_MISFIT_CAP), -_MISFIT_CAP, _MISFIT_CAP
-        )
-        return capped * np.abs(capped)
-
-    generation = 0
+def _searched(misfit: Misfit, seed: int, generations: int, on_generation: Progress) -> Array:
+    """Best candidate (9,) of differential evolution over the unit cube."""
+    generation = count(1)
 
     def report(intermediate_result: Any) -> None:
-        nonlocal generation
-        generation += 1
-        on_generation(generation, float(intermediate_result.fun))
+        on_generation(next(generation), float(intermediate_result.fun))
 
     found = differential_evolution(
-        lambda shares: np.sum(differences(shares, SEARCH_PERIOD_S) ** 2, axis=0),
+        lambda points: np.sum(misfit.residuals(points, SEARCH_PERIOD_S) ** 2, axis=0),
         [(0.0, 1.0)] * len(FREE_PARAMETERS),
         vectorized=True,
         updating="deferred",
@@ -183,20 +209,18 @@ def fit(
         seed=np.random.default_rng(seed),
         callback=report,
     )
+    best: Array = found.x
+    return best
 
-    def jacobian(share: Array) -> Array:
-        step = _POLISH_STEP * np.eye(len(share))
-        above = np.clip(share[:, None] + step, 0.0, 1.0)
-        below = np.clip(share[:, None] - step, 0.0, 1.0)
-        change = differences(np.hstack([above, below]), POLISH_PERIOD_S)
-        width = np.diagonal(above - below)
-        return (change[:, : len(share)] - change[:, len(share) :]) / width
 
+def _polished(misfit: Misfit, start: Array) -> Array:
+    """Least squares from a candidate (9,), at a shorter period."""
     polished = least_squares(
-        lambda share: differences(share[:, None], POLISH_PERIOD_S)[:, 0],
-        found.x,
-        jac=jacobian,
+        lambda point: misfit.residuals(point[:, None], POLISH_PERIOD_S)[:, 0],
+        start,
+        jac=lambda point: misfit.jacobian(point, POLISH_PERIOD_S),
         bounds=(0.0, 1.0),
         max_nfev=POLISH_EVALUATIONS,
     )
-    return values(polished.x[:, None])[:, 0]
+    best: Array = polished.x
+    return best

@@ -80,7 +80,7 @@ class Comparison:
     trace: Trace
 
 
-def compare(
+def run_comparison(
     problem: Problem,
     models: Sequence[NamedModel],
     seed: int,

@@ -8,11 +8,11 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from bms.arrays import Array
+from bms.arrays import Array, Float32Array
 from bms.data.simulate import Samples
 from bms.kan.network import INPUT_NAMES
 
-Rows = npt.NDArray[np.float32]
+Rows = Float32Array
 Starts = npt.NDArray[np.uint32]
 
 BASE_COLUMNS = tuple(range(len(INPUT_NAMES)))

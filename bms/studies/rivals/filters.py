@@ -47,7 +47,7 @@ class SteadyKalman:
         )
 
     def estimate(self, inputs: Rows, starts: Starts) -> Array:
-        """Core temperature in K, as Estimator says."""
+        """Core temperature in K (N,), by the contract of Estimator."""
         return _run(lib.steady_kalman_rows, self._filter, inputs, starts)
 
 
@@ -77,7 +77,7 @@ class FullKalman:
         )
 
     def estimate(self, inputs: Rows, starts: Starts) -> Array:
-        """Core temperature in K, as Estimator says."""
+        """Core temperature in K (N,), by the contract of Estimator."""
         return _run(lib.kalman_rows, self._filter, inputs, starts)
 
 
@@ -119,7 +119,7 @@ class ExtendedKalman:
         )
 
     def estimate(self, inputs: Rows, starts: Starts) -> Array:
-        """Core temperature in K, as Estimator says."""
+        """Core temperature in K (N,), by the contract of Estimator."""
         return _run(lib.extended_kalman_rows, self._filter, inputs, starts)
 
 

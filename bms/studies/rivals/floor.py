@@ -39,7 +39,7 @@ class StaticFloor:
     cost = None
 
     def estimate(self, inputs: Rows, starts: Starts) -> Array:
-        """Core temperature in K, as Estimator says."""
+        """Core temperature in K (N,), by the contract of Estimator."""
         return self.evaluate(inputs.astype(np.float64))
 
 

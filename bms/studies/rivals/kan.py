@@ -16,8 +16,7 @@ from bms.tables.network_tables import CELL_COEFFICIENTS
 
 def trained_parameters(network: Network) -> int:
     """Coefficients of all splines, and two weights for each edge."""
-    edges = [edge for layer in network.layers for row in layer for edge in row]
-    return sum(len(edge.coefficients) + 2 for edge in edges)
+    return sum(len(edge.coefficients) + 2 for edge in network.edges)
 
 
 class KanEstimator:
@@ -32,7 +31,7 @@ class KanEstimator:
         self._compiled = CompiledNetwork(model)
 
     def estimate(self, inputs: Rows, starts: Starts) -> Array:
-        """Core temperature in K, as Estimator says."""
+        """Core temperature in K (N,), by the contract of Estimator."""
         return self._compiled.evaluate(inputs)[0]
 
 

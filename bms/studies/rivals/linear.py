@@ -47,7 +47,7 @@ class LinearEstimator:
         )
 
     def estimate(self, inputs: Rows, starts: Starts) -> Array:
-        """Core temperature in K, as Estimator says."""
+        """Core temperature in K (N,), by the contract of Estimator."""
         return filled(
             lambda core_K: lib.linear_rows(self._linear, pointer(inputs), len(inputs), core_K),
             len(inputs),

@@ -107,7 +107,7 @@ class PerceptronEstimator:
         return self.scaling.temperature_K(self.perceptron.values(self.scaling.of_inputs(inputs)))
 
     def estimate(self, inputs: Rows, starts: Starts) -> Array:
-        """Core temperature in K, as Estimator says."""
+        """Core temperature in K (N,), by the contract of Estimator."""
         return filled(
             lambda core_K: lib.mlp_rows(self._mlp, pointer(inputs), len(inputs), core_K),
             len(inputs),

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from bms.data.datasets import training_rows
 from bms.data.lags import Lags
 from bms.data.measurements import Measurements, read_measurements
 from bms.errors import InputError
 from bms.identification import identify
-from bms.model.make import TRAINING_SHARE
 from bms.presets import Preset
 from bms.studies.rivals.estimator import Sequences
 from bms.studies.rivals.problem import Problem
@@ -40,7 +40,7 @@ def recorded_problem(path: Path, start: Preset, fit_cell: bool, lags: Lags) -> P
     """
     recording = read_measurements(path)
     rows = len(recording.time_s)
-    cut = round(TRAINING_SHARE * rows)
+    cut = training_rows(rows)
     period_s = _period_s(path, recording)
     samples = recording.samples(lags)
     test = Sequences.of(samples)

@@ -11,13 +11,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from bms.firmware._firmware import ffi, lib
 from scipy.optimize import minimize
 from scipy.sparse import csc_matrix
 
 from bms.arrays import Array
-from bms.firmware.calibration import calibration_block
-from bms.firmware.controller import write_decision_input
+from bms.firmware.batches import DecisionBatch
 from hil_sim.studies.bench.estimate import FEW, SOME
 from hil_sim.studies.bench.machine import THIS_PROJECT, package
 from hil_sim.studies.bench.problem import Problem
@@ -32,17 +30,11 @@ SOLVER_PRECISION = 1e-5
 def decision_in_c(problem: Problem) -> Peer:
     """The firmware's decision in a loop in C."""
     firmware = problem.firmware
-    block = calibration_block(firmware.preset, firmware.model, compiled_in=True)
     calls = _calls(problem, np.arange(len(problem.lower_A)))
-    inputs = ffi.new("rcbf_input_t[]", len(calls))
-    for row, call in enumerate(calls):
-        write_decision_input(inputs[row], **call)
-    current_A = np.empty(len(inputs), np.float32)
-    output = ffi.from_buffer("float[]", current_A, require_writable=True)
+    batch = DecisionBatch(firmware.preset, firmware.model, calls)
 
     def solve() -> Array:
-        lib.host_decide_rows(ffi.addressof(block.rcbf), inputs, len(inputs), output)
-        return current_A.astype(np.float64)
+        return batch.run().astype(np.float64)
 
     return Peer("closed form in C", THIS_PROJECT, solve, C_TOLERANCE_A)
 

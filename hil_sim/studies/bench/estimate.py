@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from bms.firmware._firmware import ffi, lib
 from scipy.interpolate import BSpline
 
 from bms.arrays import Array
-from bms.firmware.calibration import calibration_block
+from bms.firmware.batches import EstimateBatch
 from bms.kan.network import INPUT_NAMES, Edge, Network
 from hil_sim.studies.bench.machine import THIS_PROJECT, package
 from hil_sim.studies.bench.problem import Problem
@@ -23,21 +22,11 @@ FEW, SOME = 100, 1000
 
 def estimate_in_c(problem: Problem) -> Peer:
     """The firmware's estimate in a loop in C."""
-    rows = np.ascontiguousarray(problem.inputs, dtype=np.float32)
-    core_K, in_domain = np.empty(len(rows), np.float32), np.empty(len(rows), np.uint8)
     firmware = problem.firmware
-    block = calibration_block(firmware.preset, firmware.model, compiled_in=True)
-    arguments = (
-        ffi.addressof(block.kan),
-        ffi.from_buffer("float[]", rows),
-        len(rows),
-        ffi.from_buffer("float[]", core_K, require_writable=True),
-        ffi.from_buffer("uint8_t[]", in_domain, require_writable=True),
-    )
+    batch = EstimateBatch(firmware.preset, firmware.model, problem.inputs)
 
     def solve() -> Array:
-        lib.host_estimate_rows(*arguments)
-        return core_K.astype(np.float64)
+        return batch.run().astype(np.float64)
 
     return Peer("KAN in C", THIS_PROJECT, solve, TOLERANCE_K)
 

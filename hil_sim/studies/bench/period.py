@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from bms.firmware._firmware import ffi, lib
 
 from bms.arrays import Array
-from bms.firmware.calibration import calibration_block
+from bms.firmware.batches import ChargeBatch
 from hil_sim.studies.bench.machine import THIS_PROJECT
 from hil_sim.studies.bench.problem import Problem
 from hil_sim.studies.bench.race import Peer
@@ -17,21 +16,12 @@ COMMAND_TOLERANCE_A = 2.1e-3
 
 def control_periods(problem: Problem) -> Peer:
     """The recorded charge played to a new ECU; its answers are the commands in A."""
-    firmware, periods = problem.firmware, problem.frames
-    block = calibration_block(firmware.preset, firmware.model, compiled_in=True)
-    config = ffi.new("bms_config_t *", {"calibration": block})
-    state = ffi.new("bms_t *")
-    received = ffi.new("can_frame_t[]", sum(map(len, periods)))
-    for target, frame in zip(received, (frame for frames in periods for frame in frames)):
-        target.id, target.length = frame.frame_id, len(frame.data)
-        ffi.memmove(target.data, frame.data, len(frame.data))
-    command_A = np.empty(len(periods), np.float32)
-    output = ffi.from_buffer("float[]", command_A, require_writable=True)
+    firmware = problem.firmware
+    periods = [[(frame.frame_id, frame.data) for frame in frames] for frames in problem.frames]
+    batch = ChargeBatch(firmware.preset, firmware.model, periods)
 
     def solve() -> Array:
-        lib.bms_init(state, config)
-        lib.host_run_periods(state, received, len(periods[0]), len(periods), output)
-        return command_A.astype(np.float64)
+        return batch.run().astype(np.float64)
 
     return Peer("control period in C", THIS_PROJECT, solve, COMMAND_TOLERANCE_A)
 

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
-import numpy.typing as npt
 
-from bms.arrays import Array
+from bms.arrays import Array, IntArray
 from bms.errors import BmsError
 
 ClockNs = Callable[[], int]
 """Nanoseconds since any moment; it must not run backwards."""
 
 
-Rows = npt.NDArray[np.int64]
+Rows = IntArray
 
 
 @dataclass(frozen=True)

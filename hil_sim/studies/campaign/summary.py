@@ -6,10 +6,9 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import binomtest
 
-from bms.arrays import Array
+from bms.arrays import Array, Mask
 from hil_sim.studies.campaign.engine import CONTROLLERS
 from hil_sim.studies.campaign.settings import CampaignSettings
 from hil_sim.studies.campaign.worker import FIRMWARE, prefix
@@ -74,9 +73,7 @@ def firmware_is_safe(summary: dict[str, Any]) -> bool:
     return bool(figures["violations"]["any"]["count"] == 0)
 
 
-def _figures(
-    settings: CampaignSettings, rows: Rows, mask: npt.NDArray[np.bool_], controller: str
-) -> dict[str, Any]:
+def _figures(settings: CampaignSettings, rows: Rows, mask: Mask, controller: str) -> dict[str, Any]:
     name = prefix(controller)
     crossed = {
         limit: (column(rows, f"{name}_{peak}") > allowed) & mask

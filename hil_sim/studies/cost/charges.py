@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bms.arrays import Mask
 from bms.presets import Preset
 from hil_sim.logs.recorder import PeriodRecorder
 from hil_sim.plant.disturbances import DisturbanceKind
@@ -26,7 +26,7 @@ class ChargeRecords(NamedTuple):
     """A charge from the ECU's start, in what the ECU receives."""
 
     records: list[bytes]
-    decides: npt.NDArray[np.bool_]
+    decides: Mask
     """(N,) by period, whether the ECU decides on the current in it."""
 
 

@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from bms.arrays import IntArray, Mask
 from bms.presets import Preset
 from hil_sim.run.settings import Settings
 from hil_sim.studies.cost.charges import charge_records, random_charges
 from hil_sim.studies.cost.counting import count
 from hil_sim.studies.cost.search import search_states
 
-Instructions = npt.NDArray[np.int64]
+Instructions = IntArray
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class CostReport:
     board: str
     costs: dict[str, Cost]
     series: dict[str, Instructions]
-    charging: npt.NDArray[np.bool_]
+    charging: Mask
     """(N,) the periods with a decision, which the figures of a charge are taken from."""
 
     def to_json(self) -> dict[str, Any]:

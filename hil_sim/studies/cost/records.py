@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from bms.arrays import IntArray
 from hil_sim.bus.buses import Frame
 
 ESTIMATOR_INPUTS = 8
@@ -38,9 +38,9 @@ class State(NamedTuple):
 class Counts(NamedTuple):
     """Instructions, (N,) each; of a single state the period is 0."""
 
-    estimate: npt.NDArray[np.int64]
-    decision: npt.NDArray[np.int64]
-    period: npt.NDArray[np.int64]
+    estimate: IntArray
+    decision: IntArray
+    period: IntArray
 
 
 def restart() -> bytes:

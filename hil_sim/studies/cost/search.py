@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from bms.arrays import Array
 from bms.presets import Preset
 from hil_sim.studies.cost.records import Counts, State, state
 
@@ -43,7 +43,7 @@ def search_states(
     return Counts(*(np.concatenate(column) for column in zip(*seen)))
 
 
-def _ranges(preset: Preset) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def _ranges(preset: Preset) -> tuple[Array, Array]:
     ranges = (
         *(_widened(low, high) for low, high in preset.operating_box.ranges()),
         _CORE_ABOVE_SURFACE_K,
@@ -60,6 +60,6 @@ def _widened(low: float, high: float) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _state(row: npt.NDArray[np.float64]) -> State:
+def _state(row: Array) -> State:
     current_A, cooling_W, surface_K, coolant_K, rise_K, soc, reference_A = map(float, row)
     return State(current_A, cooling_W, surface_K, coolant_K, surface_K + rise_K, soc, reference_A)

@@ -1,4 +1,4 @@
-"""The header of a part; its layout is that of image_header_t in firmware_c/image/image.h."""
+"""The header of a part of an image, as firmware_c/image/image.h lays it out."""
 
 from __future__ import annotations
 
@@ -9,8 +9,12 @@ from bms.firmware._firmware import ffi, lib
 HEADER_LENGTH: int = ffi.sizeof("image_header_t")
 CRC_COVERS_FROM: int = ffi.offsetof("image_header_t", "length")
 
-APPLICATION: int = lib.IMAGE_MAGIC_APPLICATION
-CALIBRATION: int = lib.IMAGE_MAGIC_CALIBRATION
+APPLICATION_MAGIC: int = lib.IMAGE_MAGIC_APPLICATION
+CALIBRATION_MAGIC: int = lib.IMAGE_MAGIC_CALIBRATION
+HEADER_LAYOUT: int = lib.IMAGE_HEADER_LAYOUT
+ANY_TARGET: int = lib.IMAGE_ANY_TARGET
+FIRMWARE_VERSION: int = lib.BMS_FIRMWARE_VERSION
+CALIBRATION_LAYOUT: int = lib.BMS_CALIBRATION_LAYOUT
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,69 @@
+"""What bms.firmware says of the C code to others."""
+
+import numpy as np
+import pytest
+
+from bms.firmware.batches import ChargeBatch, DecisionBatch, EstimateBatch
+from bms.firmware.calibration import calibration_bytes, calibration_hashes
+from bms.firmware.controller import Firmware
+from bms.firmware.image_checks import ImagePart, calibration_status
+from bms.firmware.image_header import HEADER_LENGTH
+from bms.kan.network import INPUT_NAMES
+from bms.model.pair import load_pair
+from bms.presets import DEFAULT_PRESET
+
+INPUTS = np.array([[-20.0, 0.5, 300.0, 295.0], [-5.0, 0.2, 310.0, 305.0], [0.0, 0.0, 320.0, 318.0]])
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return load_pair(DEFAULT_PRESET, None)
+
+
+def test_a_batch_of_estimates_is_the_estimates_one_by_one(pair):
+    firmware = Firmware(*pair)
+    single_K = [
+        firmware.estimate(**dict(zip(INPUT_NAMES, row))).core_temperature_K
+        for row in INPUTS.tolist()
+    ]
+    assert EstimateBatch(*pair, INPUTS).run().tolist() == single_K
+
+
+def test_a_batch_of_decisions_is_the_decisions_one_by_one(pair):
+    states = [
+        {
+            "soc": 0.5,
+            "core_temperature_K": surface_K + 1.0,
+            "surface_temperature_K": surface_K,
+            "coolant_temperature_K": coolant_K,
+            "cooling_power_W": cooling_W,
+            "reference_current_A": -23.0,
+        }
+        for _, cooling_W, surface_K, coolant_K in INPUTS.tolist()
+    ]
+    firmware = Firmware(*pair)
+    single_A = [firmware.solve(**state).current_A for state in states]
+    assert len(set(single_A)) > 1
+    assert DecisionBatch(*pair, states).run().tolist() == single_A
+
+
+@pytest.mark.parametrize("frames", [[], [[(0x080, b"")], []]])
+def test_a_batch_of_periods_needs_equally_many_frames_in_each(pair, frames):
+    with pytest.raises(ValueError, match="same number of frames"):
+        ChargeBatch(*pair, frames)
+
+
+def test_hashes_of_a_calibration_are_those_of_model_and_preset(pair):
+    preset, model = pair
+    content = calibration_bytes(preset, model)
+    assert calibration_hashes(content) == (int(model.hash[:8], 16), int(preset.hash[:8], 16))
+    assert calibration_hashes(content + b"behind") == calibration_hashes(content)
+    with pytest.raises(ValueError, match="calibration block"):
+        calibration_hashes(content[:-1])
+
+
+def test_a_calibration_is_checked_against_a_whole_header_only():
+    part = ImagePart(bytes(100), 0)
+    assert calibration_status(part, bytes(HEADER_LENGTH)) == "IMAGE_NO_MAGIC"
+    with pytest.raises(ValueError, match=f"{HEADER_LENGTH} bytes"):
+        calibration_status(part, bytes(HEADER_LENGTH - 1))
