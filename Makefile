@@ -76,7 +76,7 @@ benchmark: .venv/tests build/extensions ## Time of a control period of the ECU i
 	build/native/benchmark 50000
 
 docs: .venv/docs ## The documentation as a site in build/site; a broken link or reference fails
-	$(BIN)/mkdocs build --strict --site-dir build/site
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --site-dir build/site
 	@echo "build/site/index.html (with search: python3 -m http.server --directory build/site)"
 
 clean: ## Remove everything that set-up, build and runs have made

@@ -20,7 +20,7 @@ _OBJECT = re.compile(r"(\w+)\s*(?:\[[^\]]*\])*\s*;")
 
 
 def header_page(name: str, text: str) -> str:
-    """Markdown of a header; ValueError when it does not say what it is for, or is not understood."""
+    """Markdown of a header; ValueError when it has no comment of its own or is not understood."""
     first = _COMMENT.match(text)
     if first is None:
         raise ValueError(f"{name}: no comment at its beginning; say in one what it is for")

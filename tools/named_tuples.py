@@ -1,4 +1,4 @@
-"""Griffe extension: a NamedTuple's fields stand in the signature of its class, as a dataclass's do."""
+"""Griffe extension: the fields of a NamedTuple stand in its signature, as those of a dataclass."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 """MkDocs hooks: pages that are made from files outside docs/, and links to files there.
 
+To be run as `python -m mkdocs` in the repository, so that this package is found.
+
 The C headers become pages of the reference, CONTRIBUTING.md and CHANGELOG.md pages of the site. All
 Markdown links by paths in the repository, so that it reads well there too; on the site such a link
 leads to the page of that file, and is plain text when the file has none.
@@ -12,9 +14,10 @@ import re
 from pathlib import Path
 from typing import Any
 
-from header_page import header_page
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File
+
+from tools.header_page import header_page
 
 ROOT = Path(__file__).parents[1]
 DOCS = "docs/"
