@@ -36,7 +36,7 @@ def header_page(name: str, text: str) -> str:
         found = pattern.search(bare)
         if found is None:
             raise ValueError(f"{name}: not a declaration that a page can be made of: {bare[:60]}")
-        parts[kind].append(f"### {found[1]}\n\n```c\n{code}\n```\n\n{_prose(comment)}")
+        parts[kind] += [f"### {found[1]}", f"```c\n{code}\n```", *filter(None, [_prose(comment)])]
     if "Constants" in parts:
         parts["Constants"] = ["```c\n" + "\n".join(parts["Constants"]) + "\n```"]
     page = [f"# {name}", _prose(first[0])]
