@@ -2,8 +2,8 @@
 
 To be run as `python -m mkdocs` in the repository, so that this package is found.
 
-The C headers become pages of the reference, CONTRIBUTING.md and CHANGELOG.md pages of the site. All
-Markdown links by paths in the repository, so that it reads well there too; on the site such a link
+The C headers become pages of the reference, CONTRIBUTING.md and CHANGELOG.md pages of the site. A
+page links by paths in the repository, so that it reads well there too; on the site such a link
 leads to the page of that file, and is plain text when the file has none.
 """
 
