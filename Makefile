@@ -17,7 +17,7 @@ PYTEST := $(BIN)/python -m pytest -n 2
 # What `make quick` tries: the C core, and of Python what is nearest to it.
 QUICK_TESTS ?= tests/firmware tests/codegen tests/bms
 
-.PHONY: help build run quick test lint generate models verify-tables long-checks fuzz benchmark clean
+.PHONY: help build run quick test lint generate models verify-tables long-checks fuzz benchmark docs clean
 .DEFAULT_GOAL := help
 
 help: ## List the targets
@@ -75,6 +75,10 @@ benchmark: .venv/tests build/extensions ## Time of a control period of the ECU i
 	$(BIN)/python -m tests.firmware.native.build benchmark --out build/native
 	build/native/benchmark 50000
 
+docs: .venv/docs ## The documentation as a site in build/site; a broken link or reference fails
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --site-dir build/site
+	@echo "build/site/index.html (with search: python3 -m http.server --directory build/site)"
+
 clean: ## Remove everything that set-up, build and runs have made
 	rm -rf .venv build out *.egg-info bms/firmware/_firmware.* bms/studies/rivals/_rivals.* hil_sim/studies/campaign/_runner.*
 
@@ -88,6 +92,10 @@ clean: ## Remove everything that set-up, build and runs have made
 .venv/tests: .venv/runtime tools/debian_packages.sh
 	tools/debian_packages.sh
 	$(INSTALL) --no-build-isolation --editable '.[test]'
+	touch $@
+
+.venv/docs: .venv/runtime
+	$(INSTALL) --no-build-isolation --editable '.[docs]'
 	touch $@
 
 build/extensions: .venv/runtime $(C_SOURCES) $(EXTENSION_BUILD)
