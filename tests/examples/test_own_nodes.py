@@ -18,7 +18,7 @@ import pytest
 
 from bms.native_build import ROOT
 from bms.presets import DEFAULT_PRESET, preset_path
-from hil_sim.bus.database import load_database
+from hil_sim.bus.database import load_codecs
 
 EXAMPLES = ROOT / "examples"
 SECONDS = 300.0
@@ -133,7 +133,7 @@ def period(**changes: float | str | None) -> dict[str, dict[str, float | str | N
 def test_what_the_example_sends_our_side_reads_with_every_counter(
     bus_module: ModuleType, line: tuple[can.BusABC, can.BusABC]
 ) -> None:
-    sender, codec = bus_module.ProtectedBus(line[0], "PLANT"), load_database()["CellThermal"]
+    sender, codec = bus_module.ProtectedBus(line[0], "PLANT"), load_codecs()["CellThermal"]
     for counter in range(17):
         sender.send("CellThermal", SurfaceTemperature=310.0, CoolantTemperature=300.0 + counter)
         frame = line[1].recv(1.0)
@@ -146,7 +146,7 @@ def test_what_the_example_sends_our_side_reads_with_every_counter(
 def test_what_our_side_sends_the_example_takes_once_and_only_intact(
     bus_module: ModuleType, line: tuple[can.BusABC, can.BusABC]
 ) -> None:
-    receiver, codec = bus_module.ProtectedBus(line[0], "ECU"), load_database()["CellElectrical"]
+    receiver, codec = bus_module.ProtectedBus(line[0], "ECU"), load_codecs()["CellElectrical"]
     good = codec.encode({"Current": -5.0, "Voltage": None}, counter=3)
     damaged = codec.encode({"Current": -5.0, "Voltage": 3.3}, counter=4)
     damaged = damaged[:3] + bytes([damaged[3] ^ 1]) + damaged[4:]
