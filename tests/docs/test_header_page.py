@@ -3,8 +3,8 @@
 import re
 
 import pytest
-from bms.firmware._firmware import ffi, lib
 
+from bms.firmware._firmware import ffi, lib
 from tests.docs.pages import ROOT
 from tools.header_page import header_page
 

@@ -4,10 +4,10 @@ import re
 import sys
 
 import yaml
-from bms.firmware._firmware import lib
 
 import bms
 from bms.calibration.calibration_block import LAYOUT
+from bms.firmware._firmware import lib
 from bms.model.model_file import FORMAT_VERSION
 from tests.docs.pages import ROOT
 from tools.architecture_picture import CORE, PICTURE, picture
