@@ -1,4 +1,7 @@
-"""What bms.firmware says of the C code to others."""
+"""What bms.firmware says of the C code to others, and that it alone knows the extension."""
+
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,12 +15,23 @@ from bms.kan.network import INPUT_NAMES
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
 
+ROOT = Path(__file__).parents[2]
 INPUTS = np.array([[-20.0, 0.5, 300.0, 295.0], [-5.0, 0.2, 310.0, 305.0], [0.0, 0.0, 320.0, 318.0]])
 
 
 @pytest.fixture(scope="module")
 def pair():
     return load_pair(DEFAULT_PRESET, None)
+
+
+def test_only_the_firmware_package_imports_its_extension():
+    users = {
+        path.parent.relative_to(ROOT).as_posix()
+        for wing in ("bms", "codegen", "hil_sim")
+        for path in (ROOT / wing).rglob("*.py")
+        if re.search(r"^\s*(from|import) bms\.firmware\._firmware\b", path.read_text(), re.M)
+    }
+    assert users == {"bms/firmware"}
 
 
 def test_a_batch_of_estimates_is_the_estimates_one_by_one(pair):
