@@ -1,17 +1,54 @@
-"""The `bms` command: loads its subcommands from the entry points of the group `bms.commands`."""
+"""The `bms` command: its subcommands are the entry points of the group `bms.commands`."""
 
 from __future__ import annotations
 
+import ast
 import os
 import sys
-from importlib.metadata import entry_points
+from importlib.abc import InspectLoader
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
+from typing import Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 from typer.exceptions import Abort, TyperException
+from typer.main import get_command, get_group
 
 from bms.errors import BmsError
 
 EXIT_DONE, EXIT_CHECK_FAILED, EXIT_WRONG_USE, EXIT_INTERRUPTED = 0, 1, 2, 130
+
+
+class _LazyCommand(TyperCommand):
+    """A command that is imported when it is called.
+
+    The list of commands and the start of `bms ecu` stay short that way.
+    """
+
+    def __init__(self, entry: EntryPoint) -> None:
+        super().__init__(entry.name, help=docstring(entry))
+        self._entry = entry
+
+    def make_context(self, *arguments: Any, **extra: Any) -> Any:
+        """Context of the imported command, which then takes the place of this one."""
+        app = _typer()
+        app.command(name=self.name)(self._entry.load())
+        return get_command(app).make_context(*arguments, **extra)
+
+
+def docstring(entry: EntryPoint) -> str:
+    """Docstring of a command's function, from its source where there is one."""
+    spec = find_spec(entry.module)
+    if spec is not None and isinstance(spec.loader, InspectLoader):
+        for node in ast.parse(spec.loader.get_source(entry.module) or "").body:
+            if isinstance(node, ast.FunctionDef) and node.name == entry.attr:
+                return ast.get_docstring(node) or ""
+    return entry.load().__doc__ or ""
+
+
+def _typer(**settings: Any) -> typer.Typer:
+    return typer.Typer(add_completion=False, pretty_exceptions_enable=False, **settings)
 
 
 def _root() -> None:
@@ -21,19 +58,16 @@ def _root() -> None:
     """
 
 
-def _application(arguments: list[str]) -> typer.Typer:
-    """Application with the command that is asked for, or with all when none is named.
-
-    Loading one only keeps the start of `bms ecu` short.
-    """
+def _application(arguments: list[str]) -> TyperGroup:
+    """Application with the command that is asked for, or with all when none is named."""
     commands = {entry.name: entry for entry in entry_points(group="bms.commands")}
     wanted = arguments[0] if arguments else ""
-    names = [wanted] if wanted in commands else sorted(commands)
-    app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
+    app = _typer(no_args_is_help=True)
     app.callback()(_root)
-    for name in names:
-        app.command(name=name)(commands[name].load())
-    return app
+    group = get_group(app)
+    for name in [wanted] if wanted in commands else sorted(commands):
+        group.add_command(_LazyCommand(commands[name]))
+    return group
 
 
 def main() -> None:
