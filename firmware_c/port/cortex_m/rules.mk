@@ -10,7 +10,7 @@ WARNINGS := -pedantic -Wall -Wextra -Werror -Wconversion -Wdouble-promotion -Wmi
 # Without fused multiply-add and errno the same operations give the same bits as on the host.
 NUMERICS := -ffp-contract=off -fno-math-errno
 # Whoever builds anywhere gets the same bytes.
-REPRODUCIBLE := -ffile-prefix-map=$(CURDIR)=. -g0
+REPRODUCIBLE := "-ffile-prefix-map=$(CURDIR)=." -g0
 CFLAGS := -std=c99 -Os -mthumb $(CPU) $(WARNINGS) $(NUMERICS) $(REPRODUCIBLE) \
   -ffunction-sections -fdata-sections -fcallgraph-info=su -MMD \
   -DPORT_TARGET=$(TARGET_ID)u \
@@ -36,7 +36,7 @@ PARTS := application_header calibration_header
 image: $(BUILD)/firmware.elf $(BUILD)/firmware.hex $(BUILD)/firmware.bin budgets
 
 budgets: $(BUILD)/firmware.elf $(BUILD)/sizes.o
-	@$(PYTHON) -m codegen.budgets $(BUILD) --target $(TARGET) --cross $(CROSS) $(if $(ACCEPT),--accept)
+	@"$(PYTHON)" -m codegen.budgets $(BUILD) --target $(TARGET) --cross $(CROSS) $(if $(ACCEPT),--accept)
 
 $(BUILD)/sizes.o: $(wildcard $F/include/*.h)
 	@printf '#include "bms.h"\nextern char state[]; char state[sizeof(bms_t)];\n' | \
@@ -57,7 +57,7 @@ $(BUILD)/boot_unsealed.bin: $(BUILD)/boot.elf
 	@$(CROSS)objcopy -O binary $< $@
 
 $(BUILD)/boot.bin: $(BUILD)/boot_unsealed.bin
-	@$(PYTHON) -m bms.image boot $< --out $(BUILD)
+	@"$(PYTHON)" -m bms.image boot $< --out $(BUILD)
 
 $(BUILD)/boot_image.o: $F/port/cortex_m/boot_image.S $(BUILD)/boot.bin
 	@$(CROSS)gcc $(CPU) -mthumb -Wa,-I$(BUILD) -c $< -o $@
@@ -72,7 +72,7 @@ $(BUILD)/unsealed.bin: $(BUILD)/unsealed.elf
 	@$(CROSS)objcopy -O binary --gap-fill=0xFF $< $@
 
 $(BUILD)/application_header.bin: $(BUILD)/unsealed.bin
-	@$(PYTHON) -m bms.image parts $< --out $(BUILD)
+	@"$(PYTHON)" -m bms.image parts $< --out $(BUILD)
 
 $(BUILD)/calibration_header.bin: $(BUILD)/application_header.bin ;
 
