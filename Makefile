@@ -83,8 +83,8 @@ clean: ## Remove everything that set-up, build and runs have made
 	rm -rf .venv build out *.egg-info bms/firmware/_firmware.* bms/studies/rivals/_rivals.* hil_sim/studies/campaign/_runner.*
 
 .venv/runtime: pyproject.toml constraints.txt setup.py
-	tools/check_machine.sh $(PYTHON)
-	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	tools/check_machine.sh "$(PYTHON)"
+	test -x $(BIN)/python || "$(PYTHON)" -m venv .venv
 	$(INSTALL) setuptools wheel cffi
 	$(INSTALL) --no-build-isolation --editable .
 	touch $@

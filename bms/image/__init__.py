@@ -2,6 +2,7 @@
 
 from bms.firmware.image_header import Header
 from bms.image.check import check_application, check_calibration, check_image
+from bms.image.making import make_command, port_name
 from bms.image.memory_map import MEMORY_MAP, TARGETS
 from bms.image.parts import calibration_of, calibration_part, with_calibration
 
@@ -14,5 +15,7 @@ __all__ = [
     "check_application",
     "check_calibration",
     "check_image",
+    "make_command",
+    "port_name",
     "with_calibration",
 ]

@@ -11,6 +11,7 @@ from bms.firmware.image_checks import (
     calibration_status,
 )
 from bms.firmware.image_header import Header
+from bms.image.making import make_command, port_name
 from bms.image.memory_map import ERASED, MEMORY_MAP, TARGETS, Region
 from bms.image.parts import calibration_of
 
@@ -25,7 +26,6 @@ REASONS = {
     "IMAGE_WRONG_FIRMWARE_VERSION": "is for another firmware version",
     "IMAGE_WRONG_CONTENT": "has a header that is not its own",
 }
-_BUILD = "make it with 'make firmware'"
 _EXPORT = "make it with 'bms export'"
 
 
@@ -44,19 +44,20 @@ def check_application(image: bytes, target: str, origin: str) -> None:
     What stands in the place of the calibration is not looked at.
     """
     boot, application = MEMORY_MAP.boot, MEMORY_MAP.application
+    remedy = f"make it with '{make_command(port_name(target))}'"
     if len(image) < application.end:
         raise InputError(
-            f"{origin}: {len(image)} bytes are no whole image; {_BUILD}, and give a calibration "
+            f"{origin}: {len(image)} bytes are no whole image; {remedy}, and give a calibration "
             "part by --calibration"
         )
-    _require(boot_status(_part(image, boot)), origin, "boot stage", _BUILD)
+    _require(boot_status(_part(image, boot)), origin, "boot stage", remedy)
     ram = MEMORY_MAP.ram
     status = application_status(_part(image, application), TARGETS[target], ram.address, ram.length)
-    _require(status, origin, "application", _BUILD)
+    _require(status, origin, "application", remedy)
     header = Header.parse(image[application.address :])
     gap = image[application.address + header.length : application.end]
     if gap.strip(bytes([ERASED])):
-        raise InputError(f"{origin}: bytes between the parts are not erased; {_BUILD}")
+        raise InputError(f"{origin}: bytes between the parts are not erased; {remedy}")
 
 
 def check_calibration(part: bytes, image: bytes, origin: str) -> None:

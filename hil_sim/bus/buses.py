@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import shlex
 import socket
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import can
@@ -13,6 +15,8 @@ from bms.errors import BusError, InputError
 from hil_sim.bus.closing import Closing
 from hil_sim.bus.slcan import SCHEME, SlcanSocketBus
 
+GUEST = Path(__file__).with_name("vcan_guest.sh")
+"""Runs a command where vcan0 exists, also on a kernel without CAN."""
 RECEIVE_BUFFER_BYTES = 1 << 20
 _STANDARD_FRAMES = [{"can_id": 0, "can_mask": 0, "extended": False}]
 
@@ -135,14 +139,17 @@ def require_room_for_ecu(name: str) -> None:
 def ecu_remedy(name: str) -> str:
     """What to do when no ECU answers on a bus."""
     if is_serial_line(name):
-        return "see that an image with this firmware runs at its other end; 'make pil' starts one"
+        return (
+            "see that an image with this firmware runs at its other end; "
+            "'bms flash' or 'make pil' starts one"
+        )
     return f"start 'bms ecu --bus {name}'"
 
 
 def _remedy(interface: str) -> str:
     if interface == "socketcan":
         return (
-            "use virtual:bms, or run the command inside tools/vcan_guest.sh, "
+            f"use virtual:bms, or run the command inside {shlex.quote(str(GUEST))}, "
             "which provides socketcan:vcan0"
         )
     if interface == "slcan":

@@ -11,7 +11,7 @@ from typing import Protocol
 
 from bms.errors import InputError
 from bms.image import TARGETS as BOARDS
-from bms.image import calibration_part, with_calibration
+from bms.image import calibration_part, make_command, port_name, with_calibration
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
 from hil_sim.bus.buses import open_bus
@@ -126,7 +126,7 @@ def find_target(name: str, build: Path = BUILD) -> LinuxTarget | QemuTarget:
 
 def built_folder(board: str, build: Path = BUILD) -> Path:
     """Where `make` builds for a board; its name is that of the port."""
-    return build / board.replace("-", "_")
+    return build / port_name(board)
 
 
 def find_board(name: str, build: Path = BUILD) -> QemuTarget:
@@ -146,5 +146,5 @@ def board_name(target: str) -> str:
 
 def _built(path: Path, port: str) -> Path:
     if not path.is_file():
-        raise InputError(f"{path}: no such file; run 'make firmware TARGET={port}' first")
+        raise InputError(f"{path}: no such file; run '{make_command(port)}' first")
     return path

@@ -13,6 +13,8 @@ from bms.image import (
     check_application,
     check_calibration,
     check_image,
+    make_command,
+    port_name,
     with_calibration,
 )
 
@@ -31,7 +33,7 @@ class Flash:
 
         Raises InputError for what the boot stage would not start.
         """
-        content = self._content() if image is None else _read(image)
+        content = self._content() if image is None else self._read(image)
         for start, kind in _LINKED_FILES.items():
             if content.startswith(start):
                 raise InputError(f"{image}: is {kind}; give the binary that lies beside it")
@@ -39,7 +41,7 @@ class Flash:
         if calibration is None:
             check_image(content, self._target, origin)
         else:
-            part = _read(calibration)
+            part = self._read(calibration)
             check_application(content, self._target, origin)
             check_calibration(part, content, str(calibration))
             content = with_calibration(content, part)
@@ -55,7 +57,18 @@ class Flash:
     def _content(self) -> bytes:
         if not self.path.exists():
             raise InputError(f"{self.path}: the flash is empty; program it with --image first")
-        return _read(self.path)
+        return self._read(self.path)
+
+    def _read(self, path: Path) -> bytes:
+        """Content of a file, as far as an image can be long; one byte more tells a longer one."""
+        try:
+            with path.open("rb") as file:
+                return file.read(MEMORY_MAP.calibration.end + 1)
+        except OSError as error:
+            raise InputError(
+                f"{path}: cannot be read ({error.strerror}); images are made by "
+                f"'{make_command(port_name(self._target))}', calibration parts by 'bms export'"
+            ) from None
 
     def _write(self, image: bytes) -> None:
         try:
@@ -65,15 +78,3 @@ class Flash:
                 f"{self.path}: cannot be written ({error.strerror}); choose a folder that can"
             ) from None
         write_bytes(self.path, image)
-
-
-def _read(path: Path) -> bytes:
-    """Content of a file, as far as an image can be long; one byte more tells a longer one."""
-    try:
-        with path.open("rb") as file:
-            return file.read(MEMORY_MAP.calibration.end + 1)
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read ({error.strerror}); 'make firmware' and 'bms export' "
-            "make images and calibration parts"
-        ) from None

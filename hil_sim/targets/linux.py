@@ -11,15 +11,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from bms.errors import BusError, InputError
-from hil_sim.bus.buses import Frame
+from hil_sim.bus.buses import GUEST, Frame
 from hil_sim.replay.recording import LAST_MESSAGE, Answer, Recording
 
-ROOT = Path(__file__).parents[2]
-GUEST = ROOT / "tools" / "vcan_guest.sh"
 WORKER = Path(__file__).with_name("socketcan_worker.py")
 INTERFACE = "vcan0"
 KERNEL = "/usr/bin/linux.uml"
-"""Of the guest, as in tools/vcan_guest.sh."""
+"""Of the guest, as in hil_sim/bus/vcan_guest.sh."""
 _LONGEST_START_S = 120.0
 _LONGEST_PERIOD_S = 0.02
 """Ten times what a control period takes in the guest on an idle machine."""
@@ -29,8 +27,6 @@ def require_interface() -> None:
     """Raise InputError where there is neither vcan0 nor what its guest needs."""
     if Path("/sys/class/net", INTERFACE).exists():
         return
-    if not GUEST.is_file():
-        raise InputError(f"{GUEST}: no such file; run the command in a checkout of the project")
     if not Path(KERNEL).exists():
         raise InputError(
             f"{INTERFACE}: no such interface, and no guest that has one; run "
@@ -53,7 +49,7 @@ def replay_on_linux(program: Path, recordings: Sequence[Recording]) -> list[list
         asked, said = Path(folder) / "frames.json", Path(folder) / "answers.json"
         asked.write_text(json.dumps(frames), encoding="utf-8")
         worker = [sys.executable, "-S", str(WORKER), str(program.resolve()), INTERFACE]
-        command = [str(GUEST), *worker, str(asked), str(said), str(last_id)]
+        command = ["bash", str(GUEST), *worker, str(asked), str(said), str(last_id)]
         limit_s = _LONGEST_START_S + _LONGEST_PERIOD_S * sum(map(len, frames))
         environment = {"VCAN_TIMEOUT_S": f"{limit_s:.0f}", **os.environ}
         done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)

@@ -10,11 +10,14 @@ from pathlib import Path
 import pytest
 
 from bms.presets import DEFAULT_PRESET, load_preset
+from hil_sim.bus import buses
 from hil_sim.logs.recorder import Recorder
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import Settings
 
 GUEST = Path(__file__).parents[2] / "tools" / "vcan_guest.sh"
+PACKAGED = buses.GUEST
+"""What it calls, of the package."""
 HAS_VCAN = Path("/sys/class/net/vcan0").exists()
 HAS_GUEST = Path("/usr/bin/linux.uml").exists()
 MISSING = "no vcan0 and no user-mode-linux: apt-get install -y user-mode-linux"
@@ -155,7 +158,7 @@ def test_the_guest_passes_on_output_and_exit_status(tmp_path, code):
 
 def test_without_the_package_the_guest_names_it(tmp_path):
     script = tmp_path / "guest.sh"
-    script.write_text(GUEST.read_text().replace("/usr/bin/linux.uml", "/not/there"))
+    script.write_text(PACKAGED.read_text().replace("/usr/bin/linux.uml", "/not/there"))
     done = subprocess.run(
         ["bash", script, "true"],
         env={**os.environ, "VCAN_FORCE": "1"},

@@ -15,12 +15,12 @@ from tempfile import TemporaryDirectory
 
 from bms.errors import BusError
 from bms.presets import load_preset
+from hil_sim.bus.buses import GUEST
 from hil_sim.logs.recorder import Recorder
 from hil_sim.run.session import run_both, run_plant
 from hil_sim.run.settings import Settings
 from hil_sim.studies.bench.layers import sampled
 from hil_sim.studies.bench.race import Clocks, Quartiles
-from hil_sim.targets.linux import GUEST
 
 BUSES = ("virtual:bench", "udp_multicast:239.74.163.71", "socketcan:vcan0")
 _GUEST_TIMEOUT_S = 900
@@ -125,12 +125,13 @@ def _ecu_process(bus: str, preset: str) -> Iterator[None]:
 
 
 def _in_guest(bus: str, preset: str, max_time_s: float, repetitions: int) -> BusSpeed:
-    """The same, run by this module's command line where tools/vcan_guest.sh provides vcan0."""
+    """The same, run by this module's command line where the guest provides vcan0."""
     parties = "two processes in a guest"
     if not GUEST.is_file():
         reason = f"no such bus on this machine, and no {GUEST.name} beside this package"
         return BusSpeed(bus, parties, 0, None, 0.0, {}, reason)
     command = [
+        "bash",
         GUEST,
         sys.executable,
         "-m",

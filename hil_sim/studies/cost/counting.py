@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from bms.errors import InputError
+from bms.image import make_command, port_name
 from hil_sim.studies.cost.records import INSTRUCTION_SHIFT, Counts, counts
 from hil_sim.targets import Emulation
 
@@ -23,7 +24,8 @@ def count(
     missing or the board is unknown.
     """
     if not program.is_file():
-        raise InputError(f"{program}: not built; run 'make cost'")
+        remedy = make_command(port_name(board), program.name)
+        raise InputError(f"{program}: not built; run '{remedy}'")
     with tempfile.TemporaryDirectory() as name:
         inputs, results = Path(name) / "records", Path(name) / "ticks"
         inputs.write_bytes(b"".join(records))
