@@ -14,9 +14,12 @@ from bms.bounds.worst_case import Effort, worst_case
 from bms.data.simulate import Samples
 from bms.kan.network import Network
 from bms.presets import Preset
+from bms.progress import Progress, part, to_nobody
 from bms.tables.rounding import PERIOD_S, arithmetic_error_K, fits_firmware
 
 FULL_EFFORT = Effort()
+_SHARE_OF_SWEEP = 0.3
+"""Of the time; the search takes the rest."""
 SEARCH_SPREAD_K = 2e-3
 """By how much searches with other seeds, and so other noise, find more (docs/error-bound.md)."""
 
@@ -29,6 +32,7 @@ def bounds_for_preset(
     seed: int,
     effort: Effort = FULL_EFFORT,
     confidence: float = CONFIDENCE,
+    progress: Progress = to_nobody,
 ) -> ErrorBounds:
     """Bounds for a network trained on profiles simulated from a preset.
 
@@ -37,8 +41,8 @@ def bounds_for_preset(
     """
     error_K = _errors_K(network, held_out)
     return ErrorBounds(
-        theorem_bound(network, training, seed),
-        worst_case(network, preset, seed, effort),
+        theorem_bound(network, training, seed, part(progress, 0.0, _SHARE_OF_SWEEP)),
+        worst_case(network, preset, seed, effort, part(progress, _SHARE_OF_SWEEP, 1.0)),
         over_profiles(error_K, held_out.profile, confidence),
         float(np.abs(error_K).max()),
     )
@@ -50,6 +54,7 @@ def bounds_for_recording(
     held_out: Samples,
     seed: int,
     confidence: float = CONFIDENCE,
+    progress: Progress = to_nobody,
 ) -> ErrorBounds:
     """Bounds for a network trained on measurements; `held_out` are rows in time order.
 
@@ -59,7 +64,7 @@ def bounds_for_recording(
     error_K = _errors_K(network, held_out)
     largest_K = max(np.abs(error_K).max(), np.abs(_errors_K(network, training)).max())
     return ErrorBounds(
-        theorem_bound(network, training, seed),
+        theorem_bound(network, training, seed, progress),
         None,
         over_blocks(error_K, confidence),
         float(largest_K),

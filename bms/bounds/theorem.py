@@ -22,6 +22,7 @@ from bms.data.simulate import Samples
 from bms.kan.basis import basis, uniform_knots
 from bms.kan.network import Network
 from bms.kan.trainable import TrainableLayer, forward
+from bms.progress import Progress, to_nobody
 
 GRIDS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 _MOST_PARAMETERS = 500
@@ -35,7 +36,9 @@ Spans = list[list[tuple[float, float]]]
 SplineParts = Callable[[int, Array], Array]
 
 
-def theorem_bound(network: Network, data: Samples, seed: int) -> TheoremBound:
+def theorem_bound(
+    network: Network, data: Samples, seed: int, progress: Progress = to_nobody
+) -> TheoremBound:
     """Sweep for networks of this one's width and degree, on the data that it was trained on."""
     rng = np.random.default_rng(seed)
     points = _normalised(network, data, rng.permutation(len(data.inputs))[:_MEASURED])
@@ -50,7 +53,8 @@ def theorem_bound(network: Network, data: Samples, seed: int) -> TheoremBound:
 
     found: dict[int, Layers] = {}
     largest, rms = [], []
-    for grid in _grids(network):
+    grids = _grids(network)
+    for number, grid in enumerate(grids):
         coarser = max((g for g in found if grid % g == 0), default=None)
         start = smooth if coarser is None else found[coarser]
         found[grid] = fitted(_regridded(start, grid, network.degree, spans), target)
@@ -58,6 +62,7 @@ def theorem_bound(network: Network, data: Samples, seed: int) -> TheoremBound:
         beyond = forward(found[grid], box)[0] - on_box
         largest.append(max(float(np.abs(apart).max()), float(np.abs(beyond).max())))
         rms.append(float(np.sqrt(np.mean(apart**2))))
+        progress((number + 1) / len(grids))
     span_K, floor = network.output_half_range_K, on_data - points.y
     return _record(
         network,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 from scipy.optimize import differential_evolution
@@ -27,6 +28,7 @@ from bms.data.profiles import (
 from bms.data.simulate import Samples, simulate
 from bms.kan.network import Network
 from bms.presets import Preset
+from bms.progress import Progress, to_nobody
 
 CORE_BEYOND_LIMIT_K = 2.0
 _PIECES = 4
@@ -51,7 +53,9 @@ class Effort:
         )
 
 
-def worst_case(network: Network, preset: Preset, seed: int, effort: Effort) -> WorstCase:
+def worst_case(
+    network: Network, preset: Preset, seed: int, effort: Effort, progress: Progress = to_nobody
+) -> WorstCase:
     """Largest error found by differential evolution and by random profiles of full steps.
 
     All profiles of a generation are simulated at once, under the same noise in each.
@@ -61,10 +65,13 @@ def worst_case(network: Network, preset: Preset, seed: int, effort: Effort) -> W
         samples = simulate(preset, profiles, np.random.default_rng([seed, 1]), network.lags)
         return samples, _errors_K(network, preset, samples)
 
+    generations = count(1)
+
     def cost(shares: Array) -> Array:
         samples, error_K = errors_K(_profiles(preset, shares.T))
         largest = np.zeros(shares.shape[1])
         np.maximum.at(largest, samples.profile, error_K)
+        progress(next(generations) / (effort.generations + 1))
         return -largest
 
     start = np.random.default_rng([seed, 2]).random((effort.candidates, _VARIABLES))

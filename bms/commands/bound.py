@@ -27,6 +27,8 @@ from bms.files import make_folder, write_text
 from bms.model.model_file import KanModel, load_model
 from bms.model.pair import check_pair
 from bms.presets import load_preset
+from bms.progress import Progress
+from bms.waiting import waiting
 
 _ROUND_OFF = 1e-9
 
@@ -61,12 +63,13 @@ def bound(
         raise InputError("bound: give --preset NAME or --data CSV, not both")
     name = preset if preset is not None else loaded.preset
     chosen_seed = loaded.training.settings.seed if seed is None else seed
-    if data is not None:
-        found = _from_recording(loaded, data, chosen_seed, confidence)
-    elif name is not None:
-        found = _from_preset(loaded, name, chosen_seed, confidence)
-    else:
-        raise InputError(f"bound: {model} was trained on measurements; give them as --data CSV")
+    with waiting("searching for the largest error") as wait:
+        if data is not None:
+            found = _from_recording(loaded, data, chosen_seed, confidence, wait.reach)
+        elif name is not None:
+            found = _from_preset(loaded, name, chosen_seed, confidence, wait.reach)
+        else:
+            raise InputError(f"bound: {model} was trained on measurements; give them as --data CSV")
     result = _result(loaded, *found)
     if out is not None:
         _write(out, found[0], result)
@@ -77,7 +80,9 @@ def bound(
     return EXIT_DONE if result["holds"] else EXIT_CHECK_FAILED
 
 
-def _from_preset(model: KanModel, name: str, seed: int, confidence: float) -> Found:
+def _from_preset(
+    model: KanModel, name: str, seed: int, confidence: float, progress: Progress
+) -> Found:
     preset = load_preset(name)
     check_pair(preset, model)
     network, data_seed = model.network, model.training.settings.seed
@@ -85,19 +90,23 @@ def _from_preset(model: KanModel, name: str, seed: int, confidence: float) -> Fo
         joined(simulated_split(preset, split, data_seed, lags=network.lags).values())
         for split in ("training", "test")
     )
-    bounds = bounds_for_preset(network, preset, training, held_out, seed, confidence=confidence)
+    bounds = bounds_for_preset(
+        network, preset, training, held_out, seed, confidence=confidence, progress=progress
+    )
     parts_K = error_bound_parts_K(network, bounds, held_out, preset)
     return bounds, parts_K, f"preset {preset.name}, seed {seed}"
 
 
-def _from_recording(model: KanModel, path: Path, seed: int, confidence: float) -> Found:
+def _from_recording(
+    model: KanModel, path: Path, seed: int, confidence: float, progress: Progress
+) -> Found:
     recording = read_measurements(path).samples(model.network.lags)
     if recording_sha256(path) == model.training.data_sha256:
         training, held_out = split_by_time(recording)
         source = f"{path.name}, last third"
     else:
         training, held_out, source = recording, recording, f"{path.name}, not trained on"
-    bounds = bounds_for_recording(model.network, training, held_out, seed, confidence)
+    bounds = bounds_for_recording(model.network, training, held_out, seed, confidence, progress)
     return bounds, error_bound_parts_K(model.network, bounds, held_out, None), source
 
 

@@ -22,12 +22,13 @@ from bms.kan.network import INPUT_NAMES
 from bms.model.model_file import load_model, load_shipped_model, shipped_model_path
 from bms.presets import Preset, load_preset
 from bms.studies.rivals.chart import save_chart
-from bms.studies.rivals.comparison import Comparison, NamedModel, Row, run_comparison
+from bms.studies.rivals.comparison import KINDS, Comparison, NamedModel, Row, run_comparison
 from bms.studies.rivals.effort import FULL, QUICK
 from bms.studies.rivals.lagged import all_lags
 from bms.studies.rivals.recorded import recorded_problem
 from bms.studies.rivals.simulated import simulated_problem
 from bms.studies.rivals.verdict import verdict
+from bms.waiting import waiting
 
 DEFAULT_CELL = "lin2014"
 _TABLE_WIDTH = 140
@@ -87,12 +88,17 @@ def compare_estimators(
     used_seed = of_models if seed is None else seed
     if out is not None:
         make_folder(out)
-    if data is not None:
-        problem = recorded_problem(data, chosen, cell is None, lags)
-    else:
-        problem = simulated_problem(chosen, used_seed, lags, profiles)
-    effort = QUICK if quick else FULL
-    comparison = run_comparison(problem, models, used_seed, time.perf_counter_ns, effort)
+    with waiting("comparing", 1 + len(models) + KINDS, "parts") as wait:
+        if data is not None:
+            wait.begin("cell and noise of the recording")
+            problem = recorded_problem(data, chosen, cell is None, lags)
+        else:
+            wait.begin("simulating profiles")
+            problem = simulated_problem(chosen, used_seed, lags, profiles)
+        effort = QUICK if quick else FULL
+        comparison = run_comparison(
+            problem, models, used_seed, time.perf_counter_ns, effort, wait.begin
+        )
     sentences = verdict(comparison)
     result = {
         "data": comparison.title,

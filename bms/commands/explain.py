@@ -25,6 +25,7 @@ from bms.studies.explanation import explain as explained
 from bms.studies.explanation.plots import layer_figure, sensitivity_figure
 from bms.studies.explanation.report import Subject, as_latex, as_text
 from bms.studies.explanation.report import as_json as as_content
+from bms.waiting import waiting
 
 _PROFILES = 30
 _UNIFORM_POINTS = 20000
@@ -53,7 +54,8 @@ def explain(
     """
     loaded = load_model(model)
     inputs, source = _inputs(loaded, data, preset)
-    result = explained(loaded.network, inputs)
+    with waiting("approximating the edges") as wait:
+        result = explained(loaded.network, inputs, wait.reach)
     subject = Subject(model.name, loaded.hash, loaded.network.input_names, source)
     content = json.dumps(as_content(subject, result), indent=1)
     figures = {

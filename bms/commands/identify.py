@@ -21,6 +21,7 @@ from bms.identification import Identification
 from bms.identification import identify as identified
 from bms.identification.preset_toml import preset_toml
 from bms.presets import Preset, load_preset
+from bms.waiting import waiting
 
 _DIGITS = 6
 
@@ -51,7 +52,8 @@ def identify(
     recording = read_measurements(data)
     cut = training_rows(len(recording.time_s))
     try:
-        result = identified(recording, start, slice(0, cut))
+        with waiting("fitting from several starts") as wait:
+            result = identified(recording, start, slice(0, cut), wait.reach)
     except InputError as error:
         raise InputError(f"{data}: {error}") from None
     if out is not None:

@@ -21,6 +21,7 @@ from bms.model.model_file import KanModel, save_model
 from bms.presets import DEFAULT_PRESET, Preset, load_preset
 from bms.pykan_import import imported_model, imported_network, read_checkpoint
 from bms.tables import network_tables
+from bms.waiting import waiting
 
 
 def import_pykan(
@@ -75,7 +76,9 @@ def import_pykan(
         output_center_K,
         output_half_range_K,
     )
-    model = imported_model(source, imported_network(source, scaling), chosen, data)
+    network = imported_network(source, scaling)
+    with waiting("testing the network") as wait:
+        model = imported_model(source, network, chosen, data, wait.reach)
     save_model(model, out)
     result = _result(model)
     if source.samples is not None:

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import Progress
 from rich.table import Table
 
 from bms.commands import options
@@ -19,6 +18,7 @@ from bms.model.make import model_for_measurements, model_for_preset
 from bms.model.model_file import KanModel, save_model
 from bms.presets import load_preset
 from bms.validation import parse
+from bms.waiting import waiting
 
 DEFAULTS = TrainingSettings()
 _LIST_EXAMPLE = "4,1,1"
@@ -87,18 +87,12 @@ def train(
         refinement_steps=refinement_steps,
     )
     _require_writable(out)
-    console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("Training", total=1.0)
-
-        def progress(share: float) -> None:
-            bar.update(task, completed=share)
-
+    with waiting("training") as wait:
         if data is not None:
-            model = model_for_measurements(data, settings, progress)
+            model = model_for_measurements(data, settings, wait.reach)
         else:
             assert preset is not None
-            model = model_for_preset(load_preset(preset), settings, progress)
+            model = model_for_preset(load_preset(preset), settings, wait.reach)
     save_model(model, out)
     typer.echo(f"{out}: model {model.hash[:8]}, error bound {model.error_bound_K:.4f} K")
     Console().print(_table(model))

@@ -14,10 +14,11 @@ from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands import options
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
-from bms.verification import CLASHING_DELTA4, SLIPS, Formulas, Verification, slips_of
+from bms.verification import CLASHING_DELTA4, PARTS, SLIPS, Formulas, Verification, slips_of
 from bms.verification import verify as certify
 from bms.verification.closed_loop import HORIZON_S, SlipCost, slip_cost
 from bms.verification.search import CounterExample
+from bms.waiting import waiting
 
 
 def verify(
@@ -40,11 +41,14 @@ def verify(
     Example: bms verify --preset lin2014 --json
     """
     pair = load_pair(preset, model)
-    result = certify(*pair, slips_of(formulas))
     costs = []
-    if slips:
-        for chosen in ((), *((slip,) for slip in (*SLIPS, CLASHING_DELTA4)), SLIPS):
-            costs.append(slip_cost(*pair, chosen, certify(*pair, chosen).certified))
+    shown = ((), *((slip,) for slip in (*SLIPS, CLASHING_DELTA4)), SLIPS) if slips else ()
+    with waiting("verifying", (1 + len(shown)) * PARTS + len(shown), "parts") as wait:
+        result = certify(*pair, slips_of(formulas), note=wait.begin)
+        for chosen in shown:
+            certified = certify(*pair, chosen, note=wait.begin).certified
+            wait.begin("what slips cost in a charge")
+            costs.append(slip_cost(*pair, chosen, certified))
     if as_json:
         content = result.as_dict()
         if costs:

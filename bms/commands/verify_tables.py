@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import Progress
 from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
@@ -16,6 +15,7 @@ from bms.commands import options
 from bms.errors import InputError
 from bms.model.model_file import KanModel, load_model, shipped_models
 from bms.verification.exhaustive import EdgeCheck, check_network
+from bms.waiting import waiting
 
 _STRIDE = 8191
 
@@ -43,15 +43,9 @@ def verify_tables(
     paths = list(model) if model else shipped_models()
     models = {str(path): _bounded(load_model(path), path) for path in paths}
     rows: list[dict[str, Any]] = []
-    console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("Arguments", total=float(len(models)))
+    with waiting("trying arguments", len(models)) as wait:
         for name, loaded in models.items():
-
-            def progress(share: float) -> None:
-                bar.advance(task, share)
-
-            checks: list[EdgeCheck] = check_network(loaded.network, stride, processes, progress)
+            checks: list[EdgeCheck] = check_network(loaded.network, stride, processes, wait.advance)
             rows += [_row(name, loaded, check) for check in checks]
     holds = all(row["holds"] for row in rows)
     if as_json:

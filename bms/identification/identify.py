@@ -18,6 +18,7 @@ from bms.errors import InputError
 from bms.identification.trajectory import thermal_trajectory
 from bms.identification.uncertainty import correlation, covariance
 from bms.presets import Preset
+from bms.progress import Progress, to_nobody
 
 FITTED = (
     "core_resistance_K_per_W",
@@ -100,14 +101,17 @@ class Identification:
 
 
 def identify(
-    measurements: Measurements, start: Preset, rows: slice | None = None
+    measurements: Measurements,
+    start: Preset,
+    rows: slice | None = None,
+    progress: Progress = to_nobody,
 ) -> Identification:
     """Thermal parameters of the cell from measured core and surface temperature.
 
     Least squares on the trajectory simulated from the first of `rows` (a slice with step 1; None
     means all) with the measured current and coolant temperature; rows after them are held out and
-    simulated on. What the data do not identify keeps the start's value. InputError for fewer than
-    100 rows to fit.
+    simulated on. What the data do not identify keeps the start's value, and the others are fitted
+    anew; `progress` is that of the present fit. InputError for fewer than 100 rows to fit.
     """
     first, stop, _ = (rows or slice(None)).indices(len(measurements.time_s))
     if stop - first < _FEWEST_ROWS:
@@ -122,7 +126,7 @@ def identify(
         UNSEEN: "kept: the measured coolant is an input",
     }
     while names:
-        cell, jacobian, residuals_K, agreeing = _fit(start.cell, names, recording)
+        cell, jacobian, residuals_K, agreeing = _fit(start.cell, names, recording, progress)
         matrix = covariance(jacobian, residuals_K, smallest_noise_K)
         errors = np.sqrt(np.diag(matrix))
         # The flat direction of two parameters that only act together shows in both.
@@ -160,7 +164,7 @@ def identify(
 
 
 def _fit(
-    start: CellParameters, names: Sequence[str], recording: Measurements
+    start: CellParameters, names: Sequence[str], recording: Measurements, progress: Progress
 ) -> tuple[CellParameters, Array, Array, int]:
     """Best cell of all starts, Jacobian (2, N, P), residuals (2, N), starts that end there."""
 
@@ -173,7 +177,7 @@ def _fit(
     center = _values(start, names)
     reach = np.array([_reach(name) for name in names])
     found = []
-    for stretch in _STRETCHES:
+    for number, stretch in enumerate(_STRETCHES):
         stretched = dataclasses.replace(
             start,
             **{name: getattr(start, name) * s for name, s in zip(FITTED, stretch) if name in names},
@@ -187,6 +191,7 @@ def _fit(
                 max_nfev=_MOST_STEPS,
             )
         )
+        progress((number + 1) / len(_STRETCHES))
     best = min(found, key=lambda fit: float(fit.cost))
     agreeing = sum(bool(fit.cost <= best.cost * (1.0 + _SAME_MINIMUM) + 1e-9) for fit in found)
     shape = (2, len(recording.time_s))

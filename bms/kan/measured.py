@@ -7,8 +7,6 @@ errors counts, because one stretch alone may hold the coldest hour.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from bms.arrays import Array
@@ -20,6 +18,7 @@ from bms.kan.scaling import Ranges, Scaling
 from bms.kan.settings import TrainingSettings
 from bms.kan.trainable import TrainableLayer
 from bms.kan.training import mean_square, train_network
+from bms.progress import Progress, to_nobody
 
 REACH = 1.5
 """Straight functions may go on beyond the trained box; what they give there is flagged."""
@@ -34,7 +33,7 @@ def train_on_recording(
     training: Samples,
     ranges: Ranges,
     settings: TrainingSettings,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: Progress = to_nobody,
 ) -> Network:
     """Network fitted to one recording whose inputs lie within `ranges`.
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from bms.arrays import Array
@@ -18,8 +16,7 @@ from bms.kan.network import Network
 from bms.kan.scaling import Ranges, Scaling
 from bms.kan.settings import TrainingSettings
 from bms.kan.trainable import TrainableLayer, forward
-
-Progress = Callable[[float], None]
+from bms.progress import Progress, part, to_nobody
 
 _STEPS_PER_EPOCH = 20
 _EPOCHS_PER_GRID_UPDATE = 5
@@ -35,7 +32,7 @@ def train_network(
     validation: Samples,
     ranges: Ranges,
     settings: TrainingSettings,
-    progress: Progress = lambda share: None,
+    progress: Progress = to_nobody,
 ) -> Network:
     """Network fitted to samples whose inputs lie within `ranges`, (low, high) for each input.
 
@@ -48,7 +45,7 @@ def train_network(
     x, target = scaling.normalised(training)
     held_out = scaling.normalised(validation)
     rng = np.random.default_rng(settings.seed)
-    starts = [_penalised_epochs(x, target, settings, rng, lambda share: progress(0.6 * share))]
+    starts = [_penalised_epochs(x, target, settings, rng, part(progress, 0.0, 0.6))]
     if settings.has_one_hidden_node:
         starts.append(additive_layers(x, target, settings, 1.0, _START_ROUGHNESS))
     candidates = []

@@ -25,11 +25,14 @@ from bms.kan.measured import train_on_recording
 from bms.kan.network import Network
 from bms.kan.scaling import Ranges
 from bms.kan.settings import TrainingSettings
-from bms.kan.training import Progress, train_network
+from bms.kan.training import train_network
 from bms.model.model_file import FORMAT_VERSION, KanModel, SplitErrors, TrainingRecord
 from bms.presets import Preset
+from bms.progress import Progress, part
 from bms.tables.rounding import edge_error_bounds, fits_firmware
 
+_SHARE_OF_TRAINING = 0.8
+"""Of the time; the error bounds take the rest."""
 _BOX_MARGIN = 0.1
 _SMALLEST_HALF_RANGE = 0.5
 _FEWEST_ROWS = 100
@@ -54,7 +57,13 @@ def model_for_preset(
     samples = {split: joined(kinds.values()) for split, kinds in data.items()}
     box = preset.operating_box.ranges()
     ranges = (*box, *_box(samples["training"].inputs[:, len(box) :]))
-    network = train_network(samples["training"], samples["validation"], ranges, settings, progress)
+    network = train_network(
+        samples["training"],
+        samples["validation"],
+        ranges,
+        settings,
+        part(progress, 0.0, _SHARE_OF_TRAINING),
+    )
     errors: dict[str, SplitErrors] = {
         split: SplitErrors(
             overall=_figures(network, samples[split]),
@@ -70,6 +79,7 @@ def model_for_preset(
         samples["test"],
         settings.seed,
         FULL_EFFORT.scaled(counts["test"] / PROFILES_OF_EACH_KIND["test"]),
+        progress=part(progress, _SHARE_OF_TRAINING, 1.0),
     )
     return finished_model(
         network,
@@ -98,8 +108,10 @@ def model_for_measurements(path: Path, settings: TrainingSettings, progress: Pro
     if rows < _FEWEST_ROWS:
         raise InputError(f"{path}: {rows} rows; training needs at least {_FEWEST_ROWS}")
     training, test = split_by_time(recording)
-    network = train_on_recording(training, _box(training.inputs), settings, progress)
-    bounds = bounds_for_recording(network, training, test, settings.seed)
+    of_training = part(progress, 0.0, _SHARE_OF_TRAINING)
+    network = train_on_recording(training, _box(training.inputs), settings, of_training)
+    of_bounds = part(progress, _SHARE_OF_TRAINING, 1.0)
+    bounds = bounds_for_recording(network, training, test, settings.seed, progress=of_bounds)
     return finished_model(
         network,
         TrainingRecord(

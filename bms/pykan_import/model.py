@@ -16,6 +16,7 @@ from bms.kan.settings import TrainingSettings
 from bms.model.make import finished_model
 from bms.model.model_file import KanModel, SplitErrors, TrainingRecord
 from bms.presets import Preset
+from bms.progress import Progress, to_nobody
 from bms.pykan_import.checkpoint import Checkpoint
 
 UNKNOWN_ERROR_K = 1000.0
@@ -25,7 +26,11 @@ _SEED = 0
 
 
 def imported_model(
-    checkpoint: Checkpoint, network: Network, preset: Preset, data: Path | None
+    checkpoint: Checkpoint,
+    network: Network,
+    preset: Preset,
+    data: Path | None,
+    progress: Progress = to_nobody,
 ) -> KanModel:
     """Model of an imported network, with its errors on the preset's test profiles or on a CSV file.
 
@@ -37,7 +42,7 @@ def imported_model(
     if data is not None:
         recording = read_measurements(data).samples()
         digest = hashlib.sha256(data.read_bytes()).hexdigest()
-        bounds = bounds_for_recording(network, recording, recording, _SEED)
+        bounds = bounds_for_recording(network, recording, recording, _SEED, progress=progress)
         return _model(
             checkpoint,
             network,
@@ -49,7 +54,7 @@ def imported_model(
     kinds = simulated_split(preset, "test", _SEED)
     test = joined(kinds.values())
     training = joined(simulated_split(preset, "training", _SEED).values())
-    bounds = bounds_for_preset(network, preset, training, test, _SEED)
+    bounds = bounds_for_preset(network, preset, training, test, _SEED, progress=progress)
     return _model(
         checkpoint,
         network,

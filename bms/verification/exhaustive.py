@@ -18,6 +18,7 @@ import numpy.typing as npt
 from bms.arrays import Array, Mask
 from bms.firmware.edges import CompiledEdges
 from bms.kan.network import Edge, Network
+from bms.progress import to_nobody
 from bms.tables.network_tables import network_tables
 
 PATTERNS = 2**32
@@ -30,7 +31,6 @@ _FACE_TOLERANCE = float(np.float32(1e-6))
 _ROUND_OFF_BITS = 57.0
 
 Patterns = npt.NDArray[np.uint32]
-Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
@@ -151,21 +151,25 @@ class EdgeSweep:
 
 
 def check_network(
-    network: Network, stride: int, processes: int, progress: Progress = lambda share: None
+    network: Network, stride: int, processes: int, advance: Callable[[float], None] = to_nobody
 ) -> list[EdgeCheck]:
     """Check of every edge: of all arguments (stride 1), or of each stride-th and special ones.
 
-    An odd stride lets all bits of the argument vary. `progress` gets the share that a part of the
+    An odd stride lets all bits of the argument vary. `advance` gets the share that a part of the
     work has had of the whole. Raises InputError when the network exceeds the firmware's maxima.
     """
     numbers = range(len(network.edges))
     if stride > 1:
-        return [EdgeSweep(network, number).check_some(stride) for number in numbers]
+        checks = []
+        for number in numbers:
+            checks.append(EdgeSweep(network, number).check_some(stride))
+            advance(1.0 / len(numbers))
+        return checks
     firsts = range(0, PATTERNS, _PART)
     with ProcessPoolExecutor(processes) as pool:
         parts = [[pool.submit(_check_part, network, n, first) for first in firsts] for n in numbers]
         for _ in as_completed(chain.from_iterable(parts)):
-            progress(1.0 / (len(numbers) * len(firsts)))
+            advance(1.0 / (len(numbers) * len(firsts)))
         return [_joined(part.result() for part in edge) for edge in parts]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -29,6 +29,8 @@ from bms.verification.slips import Slip, with_slips
 from bms.verification.thermal import Case, certify
 
 LARGEST_BOXES = 400_000
+PARTS = 4
+"""Of a verification: what is electrical, the core, and the surface with two chains."""
 MARGINS = (
     "voltage_margin_V",
     "soc_margin_per_s",
@@ -93,13 +95,15 @@ def verify(
     model: KanModel,
     slips: tuple[Slip, ...] = (),
     largest_boxes: int = LARGEST_BOXES,
+    note: Callable[[str], None] = lambda part: None,
 ) -> Verification:
     """Certify the four barriers over one decision for the firmware's own constants.
 
-    With slips, for constants that contain them; a barrier is given up beyond largest_boxes. Raises
-    what loading the calibration raises.
+    With slips, for constants that contain them; a barrier is given up beyond largest_boxes. `note`
+    is told which of the PARTS comes next. Raises what loading the calibration raises.
     """
     begin = time.monotonic()
+    note("voltage, state of charge and domains")
     constants = with_slips(preset, firmware_constants(preset, model), slips)
     errors = reading_errors(preset)
     cases = _thermal_cases(preset, constants)
@@ -113,17 +117,19 @@ def verify(
     results = [
         BarrierResult("voltage", voltage, None, voltage_example, None),
         BarrierResult("soc", certify_soc(preset, constants), None, None, None),
-        *(
+    ]
+    for domain, case in cases:
+        name = _name(domain, case.barrier)
+        note(name)
+        results.append(
             BarrierResult(
-                _name(domain, case.barrier),
+                name,
                 certify(domain, case, errors, largest_boxes),
                 domain,
                 search(domain, case.barrier),
                 search(replace(domain, flows=()), case.barrier),
             )
-            for domain, case in cases
-        ),
-    ]
+        )
     return Verification(
         preset=preset.name,
         model=model.hash[:8],

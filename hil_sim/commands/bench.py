@@ -14,10 +14,11 @@ from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands.options import DEFAULT_PROCESSES, JsonOption, PresetOption
 from bms.errors import InputError
 from bms.presets import DEFAULT_PRESET
+from bms.waiting import waiting
 from hil_sim.commands import options
 from hil_sim.studies.bench.outcome import outcome_json
 from hil_sim.studies.bench.race import Clocks, WrongAnswerError
-from hil_sim.studies.bench.run import FULL, QUICK, Section, run_benchmark
+from hil_sim.studies.bench.run import FULL, QUICK, Section, run_benchmark, step_count
 from hil_sim.studies.bench.simulation import BUSES
 from hil_sim.studies.bench.tables import print_tables
 
@@ -67,19 +68,20 @@ def bench(
     for name in buses:
         if not all(name.partition(":")):
             raise InputError(f"--bus '{name}': not interface:channel; write for example {BUSES[0]}")
-    shown = Console(stderr=True, quiet=as_json or not sys.stderr.isatty())
+    sections = set(section or Section)
+    sizes = campaign_runs or list(QUICK_CAMPAIGN_RUNS if quick else CAMPAIGN_RUNS)
+    count = step_count(sections, buses, sizes)
     try:
-        # A slow spinner, because it shares the processor with what is timed.
-        with shown.status("", refresh_per_second=1) as status:
+        with waiting("timing", count, "steps") as wait:
             result = run_benchmark(
-                set(section or Section),
+                sections,
                 preset,
                 QUICK if quick else FULL,
                 buses,
-                campaign_runs or list(QUICK_CAMPAIGN_RUNS if quick else CAMPAIGN_RUNS),
+                sizes,
                 jobs,
                 Clocks(time.perf_counter_ns, time.process_time_ns),
-                status.update,
+                wait.begin,
             )
     except WrongAnswerError as error:
         print(f"bms: {error}", file=sys.stderr)

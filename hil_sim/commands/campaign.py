@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import sys
 import time
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.box import SIMPLE
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
@@ -26,6 +24,7 @@ from bms.commands.options import (
 )
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
+from bms.waiting import waiting
 from hil_sim.commands import options
 from hil_sim.run.workforce import Workforce, dask_workforce, local_workforce
 from hil_sim.studies.campaign.histogram import save_histograms
@@ -70,7 +69,7 @@ def campaign(
     with workforce as force:
         folder = CampaignFolder(out, settings, resume)
         start_s = time.perf_counter()
-        done = _run(settings, folder, force, quiet=as_json)
+        done = _run(settings, folder, force)
         wall_time_s = time.perf_counter() - start_s
     folder.finish()
     rows = folder.rows()
@@ -88,24 +87,11 @@ def campaign(
     return EXIT_DONE if firmware_is_safe(summary) else EXIT_CHECK_FAILED
 
 
-def _run(
-    settings: CampaignSettings, folder: CampaignFolder, workforce: Workforce, quiet: bool
-) -> int:
-    bar = Progress(
-        TextColumn("charging"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    )
-    is_shown = not quiet and sys.stderr.isatty()
-    shown: AbstractContextManager[Any] = bar if is_shown else nullcontext()
-    todo = sum(map(len, folder.unfinished()))
-    task = bar.add_task("runs", total=settings.runs, completed=settings.runs - todo)
+def _run(settings: CampaignSettings, folder: CampaignFolder, workforce: Workforce) -> int:
+    done = settings.runs - sum(map(len, folder.unfinished()))
     try:
-        with shown:
-            return run_campaign(settings, folder, workforce, lambda n: bar.advance(task, n))
+        with waiting("charging", settings.runs, "runs", done) as wait:
+            return run_campaign(settings, folder, workforce, wait.advance)
     except KeyboardInterrupt:
         kept = settings.runs - sum(map(len, folder.unfinished()))
         print(

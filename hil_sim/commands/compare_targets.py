@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,7 +11,6 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
@@ -20,6 +18,7 @@ from bms.commands.options import JsonOption
 from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
+from bms.waiting import waiting
 from hil_sim.commands import options
 from hil_sim.commands.fault_matrix import chosen_rows
 from hil_sim.commands.replay_output import first_json, first_table
@@ -77,17 +76,10 @@ def compare_targets(
     recorded = load_scenarios(logs) if logs else None
     for place in targets:
         place.require_place()
-    columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(
-        *columns,
-        console=Console(stderr=True),
-        transient=True,
-        disable=as_json or not sys.stderr.isatty(),
-    ) as bar:
-        count = len(logs) if logs else 1 + len(playable)
-        task = bar.add_task("runs", total=count * (len(targets) + (not logs)))
-        scenarios = recorded or _recorded(seed, playable, bar, task)
-        agreements = agreements_with_host(targets, scenarios, lambda: bar.advance(task))
+    count = (len(logs) if logs else 1 + len(playable)) * (len(targets) + (not logs))
+    with waiting("playing on host and targets", count, "runs") as wait:
+        scenarios = recorded or _recorded(seed, playable, wait.advance)
+        agreements = agreements_with_host(targets, scenarios, wait.advance)
     if as_json:
         print(json.dumps(_json(scenarios, agreements, left_out), indent=2))
     else:
@@ -95,9 +87,9 @@ def compare_targets(
     return EXIT_DONE if _is_equal(agreements) else EXIT_CHECK_FAILED
 
 
-def _recorded(seed: int, rows: list[Row], bar: Progress, task: Any) -> list[Scenario]:
+def _recorded(seed: int, rows: list[Row], progress: Callable[[], None]) -> list[Scenario]:
     settings = MatrixSettings(*load_pair(DEFAULT_PRESET, None), seed=seed)
-    return record_scenarios(settings, rows, lambda: bar.advance(task))
+    return record_scenarios(settings, rows, progress)
 
 
 def _is_equal(agreements: Sequence[Sequence[Agreement]]) -> bool:

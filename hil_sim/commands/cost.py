@@ -14,8 +14,9 @@ from rich.table import Table
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands.options import JsonOption, seed_option
 from bms.presets import DEFAULT_PRESET, load_preset
+from bms.waiting import waiting
 from hil_sim.report.folder import OutputFolder
-from hil_sim.studies.cost import CostReport, measure_cost
+from hil_sim.studies.cost import PARTS, CostReport, measure_cost
 from hil_sim.studies.cost.chart import cost_chart
 from hil_sim.targets.catalog import BOARD_NAMES, board_name, built_folder
 
@@ -58,10 +59,13 @@ def cost(
     preset = load_preset(DEFAULT_PRESET)
     boards = [board_name(name) for name in target or BOARD_NAMES]
     with OutputFolder(out.parent) if out is not None else nullcontext() as folder:
-        reports = [
-            measure_cost(built_folder(board) / "cost.elf", board, preset, seed, charges, states)
-            for board in boards
-        ]
+        reports = []
+        with waiting("counting", len(boards) * PARTS, "parts") as wait:
+            for board in boards:
+                program = built_folder(board) / "cost.elf"
+                reports.append(
+                    measure_cost(program, board, preset, seed, charges, states, wait.begin)
+                )
         if folder is not None and out is not None:
             picture = cost_chart(reports, preset.timing.sampling_period_s)
             folder.path(out.name).write_bytes(picture)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
 import typer
@@ -40,6 +41,8 @@ def ecu(
     firmware = Ecu(preset=preset, model=model)
     stop = stop_event()
     with open_bus(bus) as connection:
+        if sys.stderr.isatty():
+            print(f"ECU on {bus}; Ctrl-C ends it", file=sys.stderr)
         node = EcuNode(connection, firmware)
         if realtime:
             period_s = firmware.preset.timing.sampling_period_s

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 import time
 from contextlib import nullcontext
 from fnmatch import fnmatchcase
@@ -14,7 +13,6 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
@@ -28,6 +26,7 @@ from bms.commands.options import (
 from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
+from bms.waiting import waiting
 from hil_sim.commands import options
 from hil_sim.fault_matrix.matrix import Row, load_matrix
 from hil_sim.fault_matrix.report import (
@@ -39,7 +38,6 @@ from hil_sim.fault_matrix.report import (
     matrix_page,
 )
 from hil_sim.fault_matrix.runner import MatrixSettings, play_all
-from hil_sim.fault_matrix.verdict import Verdict
 from hil_sim.report.folder import OutputFolder
 
 
@@ -72,7 +70,8 @@ def fault_matrix(
     chosen = chosen_rows(load_matrix(matrix), rows)
     with OutputFolder(out) if out is not None else nullcontext() as folder:
         start_s = time.perf_counter()
-        verdicts = _play(settings, chosen, jobs)
+        with waiting("playing faults", len(chosen), "rows") as wait:
+            verdicts = play_all(settings, chosen, jobs, wait.advance)
         result = MatrixResult(settings, verdicts, time.perf_counter() - start_s)
         content = json.dumps(matrix_json(result), indent=2) + "\n"
         if folder is not None:
@@ -98,16 +97,6 @@ def chosen_rows(rows: tuple[Row, ...], patterns: list[str] | None) -> list[Row]:
             raise InputError(f"--rows '{pattern}': no row has such a name; leave it out to see all")
         found |= named
     return [row for row in rows if row.name in found]
-
-
-def _play(settings: MatrixSettings, rows: list[Row], jobs: int) -> list[Verdict]:
-    """Play with a bar of the rows done on a terminal."""
-    if not sys.stderr.isatty():
-        return play_all(settings, rows, jobs)
-    columns = (TextColumn("faults"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("faults", total=len(rows))
-        return play_all(settings, rows, jobs, lambda: bar.advance(task))
 
 
 def _print(console: Console, result: MatrixResult, out: Path | None) -> None:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Protocol
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.presets import Preset
+from bms.waiting import waiting
 from hil_sim.faults import load_faults
 from hil_sim.logs import usable_format
 from hil_sim.logs.recorder import Recorder
@@ -83,9 +82,9 @@ def charge_and_report(
             if log is not None and log_folder is not None:
                 paths.append(log_folder.path(log.name))
             recorder = during_run.enter_context(Recorder(*paths)) if paths else None
-            results = [_with_progress(settings, run, recorder, as_json)]
+            results = [_followed(settings, run, recorder)]
         if baseline is not None:
-            results.append(_with_progress(baseline, run, None, as_json))
+            results.append(_followed(baseline, run, None))
         if folder is not None:
             write_report(folder, settings, results)
             folder.commit()
@@ -98,21 +97,8 @@ def charge_and_report(
     return EXIT_DONE if results[0].summary.passed else EXIT_CHECK_FAILED
 
 
-def _with_progress(
-    settings: Settings, run: Run, recorder: Recorder | None, quiet: bool
-) -> RunResult:
-    """Run with a bar of the state of charge on a terminal."""
-    if quiet or not sys.stderr.isatty():
-        return run(settings, recorder)
-    start = settings.preset.initial.soc
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("state of charge {task.percentage:.0f} %"),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    ) as bar:
-        task = bar.add_task(settings.controller.value, total=1.0)
-        bar.update(task, completed=start)
-        return run(settings, recorder, lambda soc: bar.update(task, completed=soc))
+def _followed(settings: Settings, run: Run, recorder: Recorder | None) -> RunResult:
+    """Run, and tell the state of charge meanwhile."""
+    doing = f"{settings.controller.value}, state of charge"
+    with waiting(doing, completed=settings.preset.initial.soc) as wait:
+        return run(settings, recorder, wait.reach)

@@ -13,6 +13,7 @@ from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands.options import JsonOption, model_option, preset_option
 from bms.errors import InputError
 from bms.firmware import Ecu
+from bms.waiting import waiting
 from hil_sim.commands.replay_output import ReplayReport, builds_json, print_builds
 from hil_sim.logs import usable_format
 from hil_sim.replay.builds import compare_builds, logs_in
@@ -74,12 +75,16 @@ def _replay(
 ) -> int:
     if out is not None:
         usable_format(out)
-    recording = load_recording(log)
-    ecu = Ecu(*choose_pair(recording, preset, model))
-    answers = replay_recording(recording, ecu)
-    ignored = identity_to_ignore(recording, ecu.preset, ecu.model)
-    signals = Signals(recording.database)
-    comparison = compare(recording, signals, recording.answers, answers, ignored)
+    with waiting("replaying", 3, "parts") as wait:
+        wait.begin(f"reading {log.name}")
+        recording = load_recording(log)
+        wait.begin("replaying")
+        ecu = Ecu(*choose_pair(recording, preset, model))
+        answers = replay_recording(recording, ecu)
+        wait.begin("comparing")
+        ignored = identity_to_ignore(recording, ecu.preset, ecu.model)
+        signals = Signals(recording.database)
+        comparison = compare(recording, signals, recording.answers, answers, ignored)
     if out is not None:
         with OutputFolder(out.parent) as folder:
             write_replayed(folder.path(out.name), recording, answers)
@@ -106,7 +111,9 @@ def _replay(
 def _against(
     builds: tuple[Path, Path], folder: Path, preset: str | None, model: Path | None, as_json: bool
 ) -> int:
-    verdicts = compare_builds(builds, logs_in(folder), preset, model)
+    logs = logs_in(folder)
+    with waiting("replaying on both builds", len(builds) * len(logs), "replays") as wait:
+        verdicts = compare_builds(builds, logs, preset, model, wait.advance)
     if as_json:
         print(json.dumps(builds_json(builds, verdicts), indent=2))
     else:

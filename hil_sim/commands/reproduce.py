@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -12,16 +11,16 @@ from typing import Annotated
 from rich import box
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands.options import DEFAULT_PROCESSES, JsonOption, out_folder_option
 from bms.presets import Preset, load_preset
+from bms.waiting import waiting
 from hil_sim.commands import options
 from hil_sim.report.folder import OutputFolder
 from hil_sim.studies.reproduction.files import CAUTION, content_json, write_reproduction
-from hil_sim.studies.reproduction.runs import PRESETS, Case, Results, all_cases, run_cases
+from hil_sim.studies.reproduction.runs import PRESETS, Results, all_cases, run_cases
 from hil_sim.studies.reproduction.sections import BAD, Section, passed, sections
 
 
@@ -45,7 +44,8 @@ def reproduce(
     """
     cases, presets = all_cases(), [load_preset(name) for name in PRESETS]
     with OutputFolder(out) if out is not None else nullcontext() as folder:
-        results = _run(cases, seed, jobs, max_time_s)
+        with waiting("charging", len(cases), "charges") as wait:
+            results = run_cases(cases, seed, jobs, max_time_s, wait.advance)
         if folder is not None:
             write_reproduction(folder, presets, results, seed)
             folder.commit()
@@ -54,16 +54,6 @@ def reproduce(
     else:
         _print(Console(), presets, results, out)
     return EXIT_DONE if passed(results) else EXIT_CHECK_FAILED
-
-
-def _run(cases: Sequence[Case], seed: int, jobs: int, max_time_s: float) -> Results:
-    """Run with a bar of the charges done on a terminal."""
-    if not sys.stderr.isatty():
-        return run_cases(cases, seed, jobs, max_time_s)
-    columns = (TextColumn("charges"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("charges", total=len(cases))
-        return run_cases(cases, seed, jobs, max_time_s, lambda: bar.advance(task))
 
 
 def _print(console: Console, presets: Sequence[Preset], results: Results, out: Path | None) -> None:

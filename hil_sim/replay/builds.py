@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -49,16 +49,24 @@ def logs_in(folder: Path) -> list[Path]:
 
 
 def compare_builds(
-    builds: tuple[Path, Path], logs: Sequence[Path], preset: str | None, model: Path | None
+    builds: tuple[Path, Path],
+    logs: Sequence[Path],
+    preset: str | None,
+    model: Path | None,
+    advance: Callable[[int], None] = lambda replays: None,
 ) -> list[LogVerdict]:
     """Replay logs on two builds, each in a process of its own, and compare what they answer.
 
-    Raises InputError for a build or log that cannot be used.
+    `advance` gets how many replays were done. Raises InputError for a build or log that cannot be
+    used.
     """
     for build in builds:
         FIRMWARE.find_build(build)
     with ThreadPoolExecutor(len(builds)) as pool:
-        both = list(pool.map(lambda build: _answers(build, logs, preset, model), builds))
+        futures = [pool.submit(_answers, build, logs, preset, model) for build in builds]
+        for future in as_completed(futures):
+            advance(0 if future.exception() else len(logs))
+        both = [future.result() for future in futures]
     return [_verdict(log, one, other) for log, one, other in zip(logs, *both)]
 
 

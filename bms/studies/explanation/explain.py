@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 
 from bms.arrays import Array
 from bms.kan.domain import EVERYWHERE
 from bms.kan.network import Edge, Network
+from bms.progress import Progress, to_nobody
 from bms.studies.explanation.approximation import Approximation
 from bms.studies.explanation.fitting import Candidate, candidates, chosen
 from bms.studies.explanation.formula import Formula, evaluate, formula
@@ -70,16 +72,21 @@ class Explanation:
     sensitivities: tuple[Sensitivity, ...]
 
 
-def explain(network: Network, inputs: Array) -> Explanation:
+def explain(network: Network, inputs: Array, progress: Progress = to_nobody) -> Explanation:
     """Explanation of a network over data whose inputs (N, n_in) are physical."""
     values = node_values(network, inputs)
     gains_K = node_gains_K(network, values)
+    done = count(1)
+    edge_count = sum(len(row) for layer in network.layers for row in layer)
+
+    def explained(place: tuple[int, int, int], edge: Edge) -> EdgeExplanation:
+        explanation = _edge(network, place, edge, values, gains_K)
+        progress(next(done) / edge_count)
+        return explanation
+
     edges = tuple(
         tuple(
-            tuple(
-                _edge(network, (number, source, target), edge, values, gains_K)
-                for source, edge in enumerate(row)
-            )
+            tuple(explained((number, source, target), edge) for source, edge in enumerate(row))
             for target, row in enumerate(layer)
         )
         for number, layer in enumerate(network.layers)

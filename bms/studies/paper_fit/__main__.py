@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from bms.errors import BmsError
@@ -26,6 +25,7 @@ from bms.studies.paper_fit.fit import (
 )
 from bms.studies.paper_fit.preset_text import with_values
 from bms.validation import read_text
+from bms.waiting import waiting
 
 
 def run(
@@ -55,22 +55,18 @@ def run(
     console = Console()
     fitted = load_preset(preset)
     if generations > 0:
-        fitted = _search(fitted, error_bound_K, seed, generations, console)
+        fitted = _search(fitted, error_bound_K, seed, generations)
     console.print(_parameter_table(fitted))
     console.print(_figure_table(fitted, error_bound_K))
     if out is not None:
         write_text(out, with_values(read_text(preset_path(preset)), _fitted_values(fitted)))
 
 
-def _search(
-    preset: Preset, error_bound_K: float | None, seed: int, generations: int, console: Console
-) -> Preset:
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console) as progress:
-        task = progress.add_task("searching", total=generations)
+def _search(preset: Preset, error_bound_K: float | None, seed: int, generations: int) -> Preset:
+    with waiting("searching", generations, "generations") as wait:
 
         def show(generation: int, misfit: float) -> None:
-            progress.update(task, completed=generation, description=f"misfit {misfit:.3f}")
+            wait.reach(generation, f"searching, misfit {misfit:.3f}")
 
         values = fit(preset, error_bound_K, seed, generations, show)
     return rounded_preset(preset, values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -22,6 +22,8 @@ from bms.studies.rivals.timing import Clock, time_per_estimate_ns
 
 Role = Literal["kan", "filter", "perceptron", "linear", "floor"]
 
+KINDS = 4
+"""Of estimators besides the models: filters, perceptron, linear maps, floor."""
 PAPER_PARAMETERS = 35
 """Of the paper's network, [4,1,1] with G = 2 and k = 3."""
 NO_SCIKIT_LEARN = (
@@ -86,10 +88,12 @@ def run_comparison(
     seed: int,
     clock_ns: Clock,
     effort: Effort = FULL,
+    note: Callable[[str], None] = lambda estimators: None,
 ) -> Comparison:
     """Every estimator fitted to the problem's data and run on its test, in float32 C.
 
-    `seed` is that of the fits; all but the times is deterministic.
+    `seed` is that of the fits; all but the times is deterministic. `note` is told which estimators
+    come next: each model, and KINDS besides.
     """
     begin, end = problem.test.starts[problem.trace_profile : problem.trace_profile + 2]
     rows: list[Row] = []
@@ -103,7 +107,9 @@ def run_comparison(
 
     told = (problem.cell, problem.noise, problem.period_s)
     for name, model in models:
+        note(name)
         add("kan", KanEstimator(name, model, columns_of(model.network, problem.lags)))
+    note("Kalman filters")
     add("filter", SteadyKalman(*told, problem.cell_origin))
     add("filter", FullKalman(*told, problem.cell_origin))
     ignorant = f"{problem.cell_origin}, not R0"
@@ -112,17 +118,20 @@ def run_comparison(
         name = "Kalman (steady gain, tuned)"
         given = "a cell and noise tuned to the core temperature of the training data"
         add("filter", SteadyKalman(*problem.tuned, problem.period_s, given, name))
+    note("perceptron")
     static = [model.network for _, model in models if not model.network.lags]
     nodes = hidden_nodes(trained_parameters(static[0]) if static else PAPER_PARAMETERS)
     perceptron = PerceptronEstimator(
         problem.before_validation, problem.validation, nodes, effort, seed
     )
     add("perceptron", perceptron)
+    note("linear maps")
     add("linear", LinearEstimator("least squares", problem.training, BASE_COLUMNS, ()))
     if problem.lags:
         every = range(problem.training.inputs.shape[1])
         name = "least squares (lagged inputs)"
         add("linear", LinearEstimator(name, problem.training, every, problem.lags))
+    note("floor of static maps")
     try:
         add("floor", static_floor(perceptron, problem, effort, seed))
     except ModuleNotFoundError:

@@ -37,6 +37,10 @@ class Section(str, Enum):
     CAMPAIGN = "campaign"
 
 
+_TIMED = {Section.ESTIMATE, Section.DECISION, Section.PERIOD}
+"""All of them on the states of one charge."""
+
+
 @dataclass(frozen=True)
 class Effort:
     """How often everything is repeated, and the simulated time of a charge on a bus at most."""
@@ -66,6 +70,14 @@ class Result:
     campaign: list[Throughput] = field(default_factory=list)
 
 
+def step_count(sections: set[Section], buses: list[str], campaign_runs: list[int]) -> int:
+    """How often run_benchmark tells what comes next."""
+    timed = sections & _TIMED
+    steps = len(timed) + 1 if timed else 0
+    steps += len(buses) if Section.SIMULATION in sections else 0
+    return steps + (len(campaign_runs) if Section.CAMPAIGN in sections else 0)
+
+
 def run_benchmark(
     sections: set[Section],
     preset: str,
@@ -81,7 +93,7 @@ def run_benchmark(
     Raises WrongAnswerError when two ways to the same answers differ.
     """
     result = Result(this_machine())
-    if sections & {Section.ESTIMATE, Section.DECISION, Section.PERIOD}:
+    if sections & _TIMED:
         note("the charge that everything is timed on")
         problem = charge_problem(preset)
         result.states = len(problem.lower_A)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,13 @@ from bms.presets import Preset
 from hil_sim.run.settings import Settings
 from hil_sim.studies.cost.charges import charge_records, random_charges
 from hil_sim.studies.cost.counting import count
-from hil_sim.studies.cost.search import search_states
+from hil_sim.studies.cost.records import Counts
+from hil_sim.studies.cost.search import GENERATIONS, search_states
 
 Instructions = IntArray
+
+PARTS = 2 + GENERATIONS
+"""Of the work on a board: a charge, beginnings of charges, the search."""
 
 
 @dataclass(frozen=True)
@@ -53,18 +58,31 @@ class CostReport:
 
 
 def measure_cost(
-    program: Path, board: str, preset: Preset, seed: int, charges: int, states: int
+    program: Path,
+    board: str,
+    preset: Preset,
+    seed: int,
+    charges: int,
+    states: int,
+    note: Callable[[str], None] = lambda part: None,
 ) -> CostReport:
     """Count over a whole charge, `charges` random beginnings of charges, and `states` states in
     each generation of the search. The program holds the default preset's tables.
 
-    Raises InputError.
+    `note` is told which of the PARTS comes next. Raises InputError.
     """
     rng = np.random.default_rng(seed)
+    note(f"charge on {board}")
     records, charging = charge_records(Settings(preset, seed=seed))
     whole = count(program, board, records)
+    note(f"beginnings of charges on {board}")
     random = count(program, board, list(random_charges(preset, charges, rng)))
-    searched = search_states(preset, states, rng, lambda records: count(program, board, records))
+
+    def count_states(records: Sequence[bytes]) -> Counts:
+        note(f"search on {board}")
+        return count(program, board, records)
+
+    searched = search_states(preset, states, rng, count_states)
     both = whole.estimate + whole.decision
     series = {
         "estimate": whole.estimate,
