@@ -3,6 +3,7 @@
 That is firmware_c/generated, hil_sim/bus/catalog.py and docs/can.md.
 """
 
+import sys
 from pathlib import Path
 
 from bms.model.model_file import load_shipped_model
@@ -17,6 +18,10 @@ ROOT = Path(__file__).resolve().parents[1]
 FIRMWARE = ROOT / "firmware_c"
 
 if __name__ == "__main__":
+    if not (ROOT / "Makefile").is_file():
+        reason = f"{ROOT} is no checkout; 'bms export' writes the sources into another folder"
+        print(f"codegen: {reason}", file=sys.stderr)
+        sys.exit(2)
     sources = calibration_source(load_preset(DEFAULT_PRESET), load_shipped_model(DEFAULT_PRESET))
     write_files(FIRMWARE / "generated", {**can_sources(), **sources})
     write_files(ROOT / "hil_sim" / "bus", can_names())
