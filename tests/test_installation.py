@@ -206,18 +206,21 @@ def test_a_charge_is_that_of_the_repository(python: Path, anywhere: Path, bms) -
 def test_a_row_of_the_fault_matrix_is_played(python: Path, anywhere: Path) -> None:
     row = ("fault-matrix", "--rows", "lost twice", "--jobs", "1", "--json")
     played = json.loads(run(python.with_name("bms"), *row, folder=anywhere).stdout)
-    assert (played["rows"], played["red"]) == (1, 0)
+    assert played["rows"] > 0
+    assert played["red"] == 0
 
 
 def test_the_sources_that_it_exports_are_those_of_the_repository(
     python: Path, anywhere: Path
 ) -> None:
-    run(python.with_name("bms"), "export", "--out", "export", folder=anywhere)
+    folders = ("--out", "export", "--sources", "core")
+    run(python.with_name("bms"), "export", *folders, folder=anywhere)
     kept, written = (
         {path.name: path.read_bytes() for path in place.glob("*.[ch]")}
         for place in (ROOT / "firmware_c" / "generated", anywhere / "export")
     )
     assert written == kept
+    assert (anywhere / "core" / "CMakeLists.txt").is_file()
 
 
 @needs_compiler
