@@ -21,9 +21,10 @@ from bms.presets import DEFAULT_PRESET
 from bms.waiting import waiting
 from hil_sim.commands import options
 from hil_sim.commands.fault_matrix import chosen_rows
-from hil_sim.commands.replay_output import first_json, first_table
+from hil_sim.commands.replay_output import first_json, first_table, unread_json
 from hil_sim.fault_matrix.matrix import Row, load_matrix
 from hil_sim.fault_matrix.runner import MatrixSettings
+from hil_sim.logs import Selection, described
 from hil_sim.replay.signals import Signals
 from hil_sim.targets.agreement import Agreement, FrameDifference, agreements_with_host
 from hil_sim.targets.catalog import BUILD, NAMES, find_target
@@ -56,6 +57,8 @@ def compare_targets(
     build: Annotated[
         Path, typer.Option("--build", help="Folder that 'make firmware' writes to.")
     ] = BUILD,
+    channel: options.ChannelOption = None,
+    delta_times: options.DeltaTimesOption = False,
     as_json: JsonOption = False,
 ) -> int:
     """Compare the firmware on other targets with that in this process, frame by frame.
@@ -73,7 +76,7 @@ def compare_targets(
     matrix = [] if logs else chosen_rows(load_matrix(), rows)
     left_out = {row.name: reason for row in matrix if (reason := why_not_played(row)) is not None}
     playable = [row for row in matrix if row.name not in left_out]
-    recorded = load_scenarios(logs) if logs else None
+    recorded = load_scenarios(logs, Selection(channel, delta_times)) if logs else None
     for place in targets:
         place.require_place()
     count = (len(logs) if logs else 1 + len(playable)) * (len(targets) + (not logs))
@@ -108,6 +111,7 @@ def _json(
                 "name": scenario.name,
                 "periods": len(scenario.recording.periods),
                 "frames": _frame_count(scenario),
+                "unread": unread_json(scenario.recording.unread),
                 "targets": {one.target: _agreement_json(one) for one in by_scenario},
             }
             for scenario, *by_scenario in zip(scenarios, *agreements)
@@ -165,6 +169,9 @@ def _print(
         differing = [one for one in by_target if not one.comparison.is_equal]
         if differing:
             _print_first(console, differing[0])
+    for scenario in scenarios:
+        if scenario.recording.unread:
+            _say(console, f"{scenario.name}: not read: {described(scenario.recording.unread)}")
     for name, reason in left_out.items():
         _say(console, f"not played: {name}: {reason}")
     frames = sum(map(_frame_count, scenarios))

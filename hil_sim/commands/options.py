@@ -30,8 +30,22 @@ LogOption = Annotated[
     Path | None,
     typer.Option(
         "--log",
-        help="Record the bus to this file too: .log, .asc, .csv (also .gz), .blf or .mf4. "
+        help="Record the bus to this file too: .log, .asc, .csv, .trc (also .gz), .blf or .mf4. "
         "Default: nothing but can.log in --out.",
+    ),
+]
+ChannelOption = Annotated[
+    str | None,
+    typer.Option(
+        "--channel",
+        help="Channel of a log that holds frames of several, by the name that it has there.",
+    ),
+]
+DeltaTimesOption = Annotated[
+    bool,
+    typer.Option(
+        "--delta-times",
+        help="Each time of a log counts from the line before, as with 'candump -t d'.",
     ),
 ]
 RealtimeOption = Annotated[

@@ -14,8 +14,9 @@ from bms.commands.options import JsonOption, model_option, preset_option
 from bms.errors import InputError
 from bms.firmware import Ecu
 from bms.waiting import waiting
+from hil_sim.commands.options import ChannelOption, DeltaTimesOption
 from hil_sim.commands.replay_output import ReplayReport, builds_json, print_builds
-from hil_sim.logs import usable_format
+from hil_sim.logs import Selection, usable_format
 from hil_sim.replay.builds import compare_builds, logs_in
 from hil_sim.replay.comparison import compare
 from hil_sim.replay.engine import replay as replay_recording
@@ -31,7 +32,8 @@ def replay(
     log: Annotated[
         Path,
         typer.Argument(
-            help="Log as .log, .asc, .csv (also .gz), .blf or .mf4; a folder of them for --against."
+            help="Log as .log, .asc, .csv, .trc (also .gz), .blf or .mf4; "
+            "a folder of them for --against."
         ),
     ],
     preset: Annotated[
@@ -53,31 +55,40 @@ def replay(
             help="Compare two builds made by 'python -m bms.native_build' on a folder of logs.",
         ),
     ] = None,
+    channel: ChannelOption = None,
+    delta_times: DeltaTimesOption = False,
     as_json: JsonOption = False,
 ) -> int:
     """Feed the frames of a log to the firmware in virtual time and compare its decisions.
 
     Shows the first period in which what the ECU sends differs from the log, with measurements and
     both sides' estimate, interval, margins and state, then the largest difference of each signal.
-    Exit code 1 when anything differs, 2 when a log cannot be used.
+    What is in the log besides classical data frames is counted. Exit code 1 when anything differs,
+    2 when a log cannot be used.
 
     Example: bms replay out/run/can.log
     """
+    selection = Selection(channel, delta_times)
     if against is not None:
         if out is not None:
             raise InputError("--out: there are two answers with --against; leave one of them out")
-        return _against(against, log, preset, model, as_json)
-    return _replay(log, preset, model, out, as_json)
+        return _against(against, log, selection, preset, model, as_json)
+    return _replay(log, selection, preset, model, out, as_json)
 
 
 def _replay(
-    log: Path, preset: str | None, model: Path | None, out: Path | None, as_json: bool
+    log: Path,
+    selection: Selection,
+    preset: str | None,
+    model: Path | None,
+    out: Path | None,
+    as_json: bool,
 ) -> int:
     if out is not None:
         usable_format(out)
     with waiting("replaying", 3, "parts") as wait:
         wait.begin(f"reading {log.name}")
-        recording = load_recording(log)
+        recording = load_recording(log, selection)
         wait.begin("replaying")
         ecu = Ecu(*choose_pair(recording, preset, model))
         answers = replay_recording(recording, ecu)
@@ -109,11 +120,16 @@ def _replay(
 
 
 def _against(
-    builds: tuple[Path, Path], folder: Path, preset: str | None, model: Path | None, as_json: bool
+    builds: tuple[Path, Path],
+    folder: Path,
+    selection: Selection,
+    preset: str | None,
+    model: Path | None,
+    as_json: bool,
 ) -> int:
     logs = logs_in(folder)
     with waiting("replaying on both builds", len(builds) * len(logs), "replays") as wait:
-        verdicts = compare_builds(builds, logs, preset, model, wait.advance)
+        verdicts = compare_builds(builds, logs, preset, model, selection, wait.advance)
     if as_json:
         print(json.dumps(builds_json(builds, verdicts), indent=2))
     else:

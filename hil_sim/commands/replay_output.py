@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from hil_sim.bus.database import Values
+from hil_sim.logs import Unread, described
 from hil_sim.replay.builds import LogVerdict
 from hil_sim.replay.comparison import Comparison, PeriodDifference
 from hil_sim.replay.outcome import Outcome
@@ -48,6 +49,7 @@ class ReplayReport:
             "equal": comparison.is_equal,
             "log_charge_Ah": recorded.charge_Ah,
             "replay_charge_Ah": replayed.charge_Ah,
+            "unread": unread_json(self.recording.unread),
             "first_difference": None if first is None else first_json(first, signals),
             "signals": _signals_json(comparison, signals),
         }
@@ -57,6 +59,8 @@ class ReplayReport:
         comparison = self.comparison
         name = f"{self.recording.path}: {comparison.periods} periods on preset '{self.preset}'"
         _say(console, f"{name}, model {self.model_hash}")
+        if self.recording.unread:
+            _say(console, f"not read: {described(self.recording.unread)}")
         if not self.is_identity_compared:
             _say(console, "its ECU had another preset or model, so Identity is not compared")
         if comparison.first is None:
@@ -106,8 +110,15 @@ def print_builds(
         for build, faults in (("A", verdict.gone_faults), ("B", verdict.new_faults)):
             if faults:
                 _say(console, f"{verdict.log.name}: {build} alone raises {', '.join(faults)}")
+        if verdict.unread:
+            _say(console, f"{verdict.log.name}: not read: {described(verdict.unread)}")
     differing = sum(not verdict.comparison.is_equal for verdict in verdicts)
     _say(console, f"the builds differ on {differing} of {len(verdicts)} logs")
+
+
+def unread_json(unread: Mapping[Unread, int]) -> dict[str, int]:
+    """How many of what was not read, by kind."""
+    return {kind.name.lower(): unread[kind] for kind in Unread if unread.get(kind)}
 
 
 def _say(console: Console, text: str) -> None:
@@ -159,6 +170,7 @@ def _verdict_json(verdict: LogVerdict) -> dict[str, Any]:
         "charge_difference_Ah": verdict.charge_difference_Ah,
         "new_faults": list(verdict.new_faults),
         "gone_faults": list(verdict.gone_faults),
+        "unread": unread_json(verdict.unread),
     }
 
 

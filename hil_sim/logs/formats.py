@@ -27,12 +27,11 @@ class LogFormat:
     keeps_start: bool = True
     """Whether a first frame later than 0 s keeps its time; without that it is read at 0 s, except
     that .blf keeps a wall-clock time to the millisecond."""
-    magic: bytes = b""
-    """How every file begins."""
     library: str = ""
     """What has to be installed for it, in the extra of the suffix's name."""
     is_reproducible: bool = True
-    """Whether equal frames give equal bytes; else the file names the time of its writing."""
+    """Whether equal frames give equal bytes; else the file names the time or place of its
+    writing."""
 
 
 FORMATS = {
@@ -41,8 +40,9 @@ FORMATS = {
         LogFormat(".log"),
         LogFormat(".asc", keeps_start=False, is_reproducible=False),
         LogFormat(".csv", keeps_direction=False),
-        LogFormat(".blf", is_text=False, magic=b"LOGG", keeps_start=False),
-        LogFormat(".mf4", is_text=False, magic=b"MDF ", library="asammdf", is_reproducible=False),
+        LogFormat(".trc", keeps_start=False, is_reproducible=False),
+        LogFormat(".blf", is_text=False, keeps_start=False),
+        LogFormat(".mf4", is_text=False, library="asammdf", is_reproducible=False),
     )
 }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from bms.errors import InputError
 from bms.native_build import FIRMWARE
 from hil_sim.bus.buses import Frame
-from hil_sim.logs import log_suffixes
+from hil_sim.logs import ALL, Selection, Unread, log_suffixes
 from hil_sim.replay.comparison import Comparison, compare
 from hil_sim.replay.outcome import outcome
 from hil_sim.replay.recording import Answer, load_recording
@@ -35,6 +35,7 @@ class LogVerdict:
     charge_difference_Ah: float
     new_faults: tuple[str, ...]
     gone_faults: tuple[str, ...]
+    unread: Mapping[Unread, int]
 
 
 def logs_in(folder: Path) -> list[Path]:
@@ -53,6 +54,7 @@ def compare_builds(
     logs: Sequence[Path],
     preset: str | None,
     model: Path | None,
+    selection: Selection = ALL,
     advance: Callable[[int], None] = lambda replays: None,
 ) -> list[LogVerdict]:
     """Replay logs on two builds, each in a process of its own, and compare what they answer.
@@ -63,15 +65,15 @@ def compare_builds(
     for build in builds:
         FIRMWARE.find_build(build)
     with ThreadPoolExecutor(len(builds)) as pool:
-        futures = [pool.submit(_answers, build, logs, preset, model) for build in builds]
+        futures = [pool.submit(_answers, build, logs, preset, model, selection) for build in builds]
         for future in as_completed(futures):
             advance(0 if future.exception() else len(logs))
         both = [future.result() for future in futures]
-    return [_verdict(log, one, other) for log, one, other in zip(logs, *both)]
+    return [_verdict(log, selection, one, other) for log, one, other in zip(logs, *both)]
 
 
-def _verdict(log: Path, one: list[Answer], other: list[Answer]) -> LogVerdict:
-    recording = load_recording(log)
+def _verdict(log: Path, selection: Selection, one: list[Answer], other: list[Answer]) -> LogVerdict:
+    recording = load_recording(log, selection)
     signals = Signals(recording.database)
     before, after = (outcome(recording, signals, answers) for answers in (one, other))
     return LogVerdict(
@@ -81,14 +83,21 @@ def _verdict(log: Path, one: list[Answer], other: list[Answer]) -> LogVerdict:
         after.charge_Ah - before.charge_Ah,
         tuple(signals.faults(after.fault_bits & ~before.fault_bits)),
         tuple(signals.faults(before.fault_bits & ~after.fault_bits)),
+        recording.unread,
     )
 
 
 def _answers(
-    build: Path, logs: Sequence[Path], preset: str | None, model: Path | None
+    build: Path,
+    logs: Sequence[Path],
+    preset: str | None,
+    model: Path | None,
+    selection: Selection,
 ) -> list[list[Answer]]:
-    options = [] if preset is None else ["--preset", preset]
-    options += [] if model is None else ["--model", str(model)]
+    options = [] if preset is None else [f"--preset={preset}"]
+    options += [] if model is None else [f"--model={model}"]
+    options += [] if selection.channel is None else [f"--channel={selection.channel}"]
+    options += ["--delta-times"] if selection.delta_times else []
     with TemporaryDirectory() as folder:
         out = Path(folder) / "answers.json"
         paths = [str(path) for path in (build, out, *logs)]

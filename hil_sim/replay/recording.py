@@ -6,6 +6,7 @@ the first frame of an answer, which the ChargeCommand ends.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,8 @@ from codegen import can_database
 from hil_sim.bus.buses import Frame
 from hil_sim.bus.catalog import FrameId, Message
 from hil_sim.bus.database import MessageCodec
-from hil_sim.logs import LogFrame, read_log
+from hil_sim.logs import ALL, Log, LogFrame, Selection, Unread, head_command, log_format, read_log
+from hil_sim.replay.beginning import middle_of_run, require_beginning
 
 LAST_MESSAGE = Message.CHARGE_COMMAND
 
@@ -41,6 +43,8 @@ class Recording:
     lock_step: bool
     database: Mapping[str, MessageCodec]
     sent_by_ecu: frozenset[int]
+    unread: Mapping[Unread, int]
+    """How many of what is in the log besides."""
 
     @property
     def answers(self) -> list[Answer]:
@@ -48,7 +52,7 @@ class Recording:
         return [period.answer for period in self.periods]
 
 
-def load_recording(path: Path) -> Recording:
+def load_recording(path: Path, selection: Selection = ALL) -> Recording:
     """Read a log of any format.
 
     Raises InputError in one line when it cannot be read, is not of this project's bus, holds no
@@ -57,16 +61,19 @@ def load_recording(path: Path) -> Recording:
     messages = can_database.load_database().messages
     database = {message.name: MessageCodec(message) for message in messages}
     sent_by_ecu = frozenset(m.frame_id for m in messages if can_database.ECU in m.senders)
-    frames = [frame for frame in read_log(path) if not frame.is_extended]
+    log = read_log(path, selection)
+    frames = [frame for frame in log.frames if not frame.is_extended]
+    unread = Counter(log.unread)
+    unread[Unread.EXTENDED_FRAMES] += len(log.frames) - len(frames)
     _require_ours(path, frames, database)
     last_id = database[LAST_MESSAGE].frame_id
     lock_step = any(frame.frame_id == FrameId.SYNC for frame in frames)
     cut = _Cutter(path, sent_by_ecu, last_id)
     periods = tuple(cut.lock_step(frames) if lock_step else cut.real_time(frames))
-    _require_beginning(path, periods, database)
+    require_beginning(path, [period.answer for period in periods], database)
     if len(periods) > 1 and not _has(periods[-1], last_id) and _has(periods[-2], last_id):
-        raise _cut_off(path)
-    return Recording(path, periods, lock_step, database, sent_by_ecu)
+        raise _cut_off(path, log, last_id)
+    return Recording(path, periods, lock_step, database, sent_by_ecu, +unread)
 
 
 class _Cutter:
@@ -85,7 +92,7 @@ class _Cutter:
         for frame in frames:
             if frame.frame_id in self._sent_by_ecu:
                 if step is None:
-                    raise _middle_of_run(self._path, "an answer comes before the first SYNC")
+                    raise middle_of_run(self._path, "an answer comes before the first SYNC")
                 answer.append(frame)
                 continue
             received.append(frame)
@@ -132,7 +139,7 @@ def _require_ours(path: Path, frames: list[LogFrame], database: Mapping[str, Mes
     ):
         raise InputError(
             f"{path}: foreign, no intact frame of codegen/can/bms.dbc is in it; "
-            "give a log of 'bms sil' or 'bms plant'"
+            "give a log of 'bms sil --log FILE'"
         )
     last_id = database[LAST_MESSAGE].frame_id
     if not any(frame.frame_id == last_id for frame in frames):
@@ -142,27 +149,18 @@ def _require_ours(path: Path, frames: list[LogFrame], database: Mapping[str, Mes
         )
 
 
-def _require_beginning(
-    path: Path, periods: tuple[Period, ...], database: Mapping[str, MessageCodec]
-) -> None:
-    codec = database[LAST_MESSAGE]
-    for period in periods:
-        for frame in period.answer:
-            if frame.frame_id == codec.frame_id and codec.decode(frame.data) is not None:
-                if counter := codec.counter(frame.data):
-                    raise _middle_of_run(path, f"the first {LAST_MESSAGE} has counter {counter}")
-                return
-
-
-def _middle_of_run(path: Path, reason: str) -> InputError:
-    return InputError(
-        f"{path}: begins in the middle of a run ({reason}), so the state of the ECU is not known; "
-        "record from the start of the ECU"
+def _cut_off(path: Path, log: Log, last_id: int) -> InputError:
+    *_, last = (
+        n
+        for n, frame in enumerate(log.frames)
+        if frame.frame_id == last_id and not frame.is_extended
     )
-
-
-def _cut_off(path: Path) -> InputError:
+    if log_format(path).is_text:
+        line = log.places[last]
+        place = f" (after the {LAST_MESSAGE} in line {line})"
+        remedy = f", or keep what is whole: {head_command(path, line)}"
+    else:
+        place, remedy = "", ""
     return InputError(
-        f"{path}: cut off in the middle of a control period; record it again, "
-        "or remove what comes after the last ChargeCommand"
+        f"{path}: cut off in the middle of a control period{place}; record it again{remedy}"
     )

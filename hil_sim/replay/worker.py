@@ -1,6 +1,7 @@
 """A process that replays logs on one build of the firmware; see hil_sim.replay.builds.
 
-    python -m hil_sim.replay.worker BUILD OUT [--preset P] [--model M] LOG...
+    python -m hil_sim.replay.worker [--preset P] [--model M] [--channel C] [--delta-times]
+        BUILD OUT LOG...
 
 The extension is put in place before anything imports the installed one. OUT becomes JSON: for each
 log the frames of each period.
@@ -15,6 +16,7 @@ from pathlib import Path
 
 from bms.errors import BmsError
 from bms.native_build import FIRMWARE
+from hil_sim.logs import Selection
 from hil_sim.replay.engine import replay
 from hil_sim.replay.identity import choose_pair
 from hil_sim.replay.recording import load_recording
@@ -30,21 +32,28 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--preset")
     parser.add_argument("--model", type=Path)
+    parser.add_argument("--channel")
+    parser.add_argument("--delta-times", action="store_true")
     parser.add_argument("logs", type=Path, nargs="+")
     arguments = parser.parse_args()
     try:
         FIRMWARE.load_build(arguments.build)
-        answers = [_replay(log, arguments.preset, arguments.model) for log in arguments.logs]
+        selection = Selection(arguments.channel, arguments.delta_times)
+        answers = [
+            _replay(log, selection, arguments.preset, arguments.model) for log in arguments.logs
+        ]
     except BmsError as error:
         print(error, file=sys.stderr)
         sys.exit(UNUSABLE)
     arguments.out.write_text(json.dumps(answers), encoding="utf-8")
 
 
-def _replay(log: Path, preset: str | None, model: Path | None) -> list[list[tuple[int, str]]]:
+def _replay(
+    log: Path, selection: Selection, preset: str | None, model: Path | None
+) -> list[list[tuple[int, str]]]:
     from bms.firmware import Ecu  # noqa: PLC0415 (the build has to be in place first)
 
-    recording = load_recording(log)
+    recording = load_recording(log, selection)
     answers = replay(recording, Ecu(*choose_pair(recording, preset, model)))
     return [[(frame.frame_id, frame.data.hex()) for frame in answer] for answer in answers]
 

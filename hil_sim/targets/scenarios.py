@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from bms.errors import InputError
 from hil_sim.fault_matrix.matrix import Row
 from hil_sim.fault_matrix.runner import MatrixSettings, run_settings
+from hil_sim.logs import ALL, Selection
 from hil_sim.logs.recorder import Recorder
 from hil_sim.replay.recording import Recording, load_recording
 from hil_sim.run.session import run_both
@@ -64,12 +65,12 @@ def _runs(settings: MatrixSettings, rows: Sequence[Row]) -> Iterator[tuple[str, 
         yield row.name, run_settings(settings, row)
 
 
-def load_scenarios(logs: Sequence[Path]) -> list[Scenario]:
+def load_scenarios(logs: Sequence[Path], selection: Selection = ALL) -> list[Scenario]:
     """Recorded logs as scenarios.
 
     Raises InputError for a log that cannot be used, as one without SYNC.
     """
-    scenarios = [Scenario(log.name, load_recording(log)) for log in logs]
+    scenarios = [Scenario(log.name, load_recording(log, selection)) for log in logs]
     for scenario in scenarios:
         if not scenario.recording.lock_step:
             raise InputError(

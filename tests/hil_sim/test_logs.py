@@ -4,12 +4,22 @@ import gzip
 import importlib.util
 from pathlib import Path
 
+import can
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bms.errors import InputError
-from hil_sim.logs import FORMATS, LogFrame, LogWriter, log_format, log_suffixes, read_log
+from hil_sim.logs import (
+    FORMATS,
+    LogFrame,
+    LogWriter,
+    Selection,
+    Unread,
+    log_format,
+    log_suffixes,
+    read_log,
+)
 
 HAS_ASAMMDF = importlib.util.find_spec("asammdf") is not None
 MICROSECOND = 1e-6
@@ -49,11 +59,52 @@ def write(path: Path, frames: list[LogFrame]) -> Path:
     return path
 
 
-@each_suffix
+@pytest.mark.parametrize("suffix", [s for s in log_suffixes() if s != ".mf4"])
 @settings(max_examples=25)
 @given(frames=logs())
 def test_what_is_written_is_read_back(tmp_path_factory, suffix, frames):
-    path = tmp_path_factory.mktemp("log") / f"can{suffix}"
+    assert_read_back(tmp_path_factory.mktemp("log") / f"can{suffix}", frames)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not HAS_ASAMMDF, reason="not run: asammdf is not installed")
+def test_foreign_frames_and_channels_of_mdf_4_are_counted(tmp_path):
+    path = tmp_path / "can.mf4"
+    usual = {"arbitration_id": 0x100, "data": bytes(8), "is_extended_id": False}
+    foreign = (
+        {"channel": 1},
+        {"dlc": 9},
+        {"is_fd": True, "data": bytes(12)},
+        {"is_remote_frame": True, "data": None},
+        {"is_error_frame": True, "data": None},
+    )
+    with can.MF4Writer(path) as writer:
+        writer(can.Message(timestamp=0.5, channel=0, **usual))
+        for change in foreign:
+            writer(can.Message(**{"timestamp": 1.0, "channel": 0, **usual, **change}))
+    with pytest.raises(InputError, match=r"2 channels .* 0 \(1 frames\), 1 \(1 frames\)"):
+        read_log(path)
+    log = read_log(path, Selection("0"))
+    assert list(log) == [LogFrame(0.5, 0x100, bytes(8))]
+    assert log.unread == {
+        Unread.OTHER_CHANNEL_FRAMES: 1,
+        Unread.LONG_DLC_FRAMES: 1,
+        Unread.CAN_FD_FRAMES: 1,
+        Unread.REMOTE_FRAMES: 1,
+        Unread.ERROR_FRAMES: 1,
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not HAS_ASAMMDF, reason="not run: asammdf is not installed")
+@settings(max_examples=3)
+@given(frames=logs())
+def test_what_is_written_as_mdf_4_is_read_back(tmp_path_factory, frames):
+    """In fewer examples, for asammdf takes a second to come up."""
+    assert_read_back(tmp_path_factory.mktemp("log") / "can.mf4", frames)
+
+
+def assert_read_back(path: Path, frames: list[LogFrame]) -> None:
     form = log_format(path)
 
     read = list(read_log(write(path, frames)))
@@ -96,7 +147,9 @@ def test_a_compressed_log_is_the_plain_one_compressed(tmp_path):
 def test_another_suffix_is_refused_and_the_known_ones_are_listed(tmp_path, name):
     path = tmp_path / name
     for use in (LogWriter, lambda path: list(read_log(path))):
-        with pytest.raises(InputError, match=r"\.log, \.asc, \.csv, \.blf, \.mf4, \.log\.gz"):
+        with pytest.raises(
+            InputError, match=r"\.log, \.asc, \.csv, \.trc, \.blf, \.mf4, \.log\.gz"
+        ):
             use(path)
     assert not path.exists()
 

@@ -49,7 +49,7 @@ def test_missing_file(tmp_path):
     assert "no such file" in refusal(tmp_path / "can.log")
 
 
-@pytest.mark.parametrize("suffix", [s for s in SUFFIXES if not s.endswith("f4")])
+@pytest.mark.parametrize("suffix", SUFFIXES)
 def test_empty_file(tmp_path, suffix):
     path = tmp_path / f"can{suffix}"
     path.write_bytes(b"")
@@ -118,11 +118,11 @@ def test_line_that_is_none_of_a_log(tmp_path, line):
     ],
 )
 def test_frame_that_no_bus_carries(tmp_path, line):
-    assert "frame 1" in refusal(text_log(tmp_path / "can.log", line + "\n"))
+    assert ": line 1" in refusal(text_log(tmp_path / "can.log", line + "\n"))
 
 
 def test_text_that_is_not_unicode(tmp_path):
-    (tmp_path / "can.csv").write_bytes(b"\xff\xfe\x00\x01")
+    (tmp_path / "can.csv").write_bytes(b"\x80\x81,\xff\n")
     assert "cannot be read as '.csv'" in refusal(tmp_path / "can.csv")
 
 
@@ -156,8 +156,8 @@ def assert_read_or_refused(read, path) -> None:
         assert "\n" not in str(refused)
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
-@settings(max_examples=100)
+@pytest.mark.parametrize("suffix", [s for s in SUFFIXES if s != ".mf4"])
+@settings(max_examples=50)
 @given(damaged=damage())
 def test_damaged_file_is_read_or_refused(tmp_path_factory, intact, suffix, damaged):
     path = tmp_path_factory.getbasetemp() / f"damaged{suffix}"
