@@ -5,6 +5,9 @@ each left-hand side can fall by no more than its margin within h, and by no more
 measurement errors, then a decision that leaves at least the margin keeps the continuous-time
 condition at every instant between samples. This is the method of Breeden, Garg and Panagou 2021
 (Theorem 3) applied to the constraint itself; docs/theory.md has the derivation.
+
+What `bms verify` takes off again is computed here too: the charge that a hold brings, the counting
+error, and what arithmetic and bus take from a decision.
 """
 
 from __future__ import annotations
@@ -16,22 +19,11 @@ import numpy as np
 
 from bms.barrier.constants import barrier_constants
 from bms.barrier.rates import Weights, largest_rate
-from bms.barrier.rounding import rounding_allowances
+from bms.barrier.readings import BUS, BusQuantisation, reading_errors, soc_error_bound
+from bms.barrier.rounding import CONSTANT_ROUNDINGS, ROUNDINGS, UNIT, rounding_allowances
 from bms.cell import CellParameters
+from bms.decision import ConstraintMargins
 from bms.presets.schema import Preset
-
-COUNTING_HORIZON_S = 3600.0
-"""Longest charge over which coulomb counting has to stay within its error bound."""
-
-
-@dataclass(frozen=True)
-class BusQuantisation:
-    """Half a step of each measured signal on the bus; equal to the CAN database by a test."""
-
-    current_A: float = 0.001
-    surface_temperature_K: float = 0.0025
-    coolant_temperature_K: float = 0.0025
-    cooling_power_W: float = 0.0005
 
 
 @dataclass(frozen=True)
@@ -44,42 +36,59 @@ class Margins:
     surface_K_per_s2: Any
 
 
-def soc_error_bound(cell: CellParameters, preset: Preset, bus: BusQuantisation) -> float:
-    """Bound on the counted state of charge: steady errors add up, noise grows as the root."""
-    sensor = preset.sensors.current_A
-    steady_A = abs(sensor.bias) + 0.5 * sensor.resolution + bus.current_A
-    noise_As = (
-        sensor.NOISE_CUTOFF
-        * sensor.noise_std
-        * float(np.sqrt(preset.timing.sampling_period_s * COUNTING_HORIZON_S))
+def strongest_current_A(preset: Preset, bus: BusQuantisation) -> float:
+    """Largest charging current that can flow (A, positive): the reference as rounded."""
+    return -preset.limits.reference_current_A * (1.0 + UNIT) + bus.command_A
+
+
+def charge_taken_up(
+    cell: CellParameters, preset: Preset, bus: BusQuantisation, current_A: Any
+) -> Any:
+    """State of charge that comes in from a reading until the current decided by it ends.
+
+    Any current flows before the decision acts, the decided one, current_A (positive), after that.
+    The latest possible begin is the worst, because no current is above the strongest.
+    """
+    timing = preset.timing
+    charge_As = timing.delay_s * strongest_current_A(preset, bus) + (
+        timing.sampling_period_s * current_A
     )
-    return (
-        steady_A * COUNTING_HORIZON_S + noise_As
-    ) / cell.capacity_As + preset.uncertainty.soc_per_s * COUNTING_HORIZON_S
+    held_s = timing.sampling_period_s + timing.delay_s
+    return charge_As / cell.capacity_As + held_s * preset.uncertainty.soc_per_s
 
 
-def sampling_margins(
-    cell: CellParameters, preset: Preset, bus: BusQuantisation = BusQuantisation()
-) -> Margins:
+def decision_allowances(
+    cell: CellParameters, preset: Preset, bus: BusQuantisation, roundings: int = ROUNDINGS
+) -> ConstraintMargins:
+    """What each left-hand side can be below zero at the current that flows (V, 1/s, K/s, K/s^2).
+
+    The decision rounds, and the bus may ask for a little more than was decided.
+    """
+    a, limits = barrier_constants(cell, preset), preset.limits
+    current_A = strongest_current_A(preset, bus)
+    hottest_K = max(preset.operating_box.surface_temperature_K[1], limits.max_core_temperature_K)
+    per_A = (
+        cell.ohmic_resistance_ohm,
+        1.0 / cell.capacity_As,
+        np.abs(a.a2_per_As) * hottest_K + 2.0 * a.a3_K_per_A2s * current_A,
+        np.abs(a.a8_per_As2) * hottest_K + 2.0 * np.abs(a.a9_K_per_A2s2) * current_A,
+    )
+    rounded = rounding_allowances(cell, preset, roundings)
+    return ConstraintMargins(
+        *(allowance + slope * bus.command_A for allowance, slope in zip(rounded, per_A))
+    )
+
+
+def sampling_margins(cell: CellParameters, preset: Preset, bus: BusQuantisation = BUS) -> Margins:
     """Margins for a cell with the timing, sensors and limits of a preset (V, 1/s, K/s, K/s^2)."""
     constants = barrier_constants(cell, preset)
-    sensors, limits = preset.sensors, preset.limits
-    current_A = -limits.reference_current_A
+    current_A = -preset.limits.reference_current_A
     held_s = preset.timing.sampling_period_s + preset.timing.delay_s
     core_gain = preset.gains.core_gain_per_s(cell)
-
-    soc_rate_per_s = current_A / cell.capacity_As + preset.uncertainty.soc_per_s
-    soc_change = held_s * soc_rate_per_s + soc_error_bound(cell, preset, bus)
-    upper_V, lower_soc = np.asarray(cell.ocv.voltage_V[1:]), np.asarray(cell.ocv.soc[:-1])
-    near_limit = np.logical_and(
-        upper_V[..., None] + current_A * cell.ohmic_resistance_ohm > limits.max_voltage_V,
-        (lower_soc < limits.completion_soc + soc_change)[..., None],
+    errors, allowances = reading_errors(preset, bus), decision_allowances(cell, preset, bus)
+    soc_change = soc_error_bound(cell, preset, bus) + charge_taken_up(
+        cell, preset, bus, strongest_current_A(preset, bus)
     )
-    steepest_V = np.max(np.where(near_limit, cell.ocv.slopes_V()[..., None], 0.0), axis=0)
-
-    surface_error_K = sensors.surface_temperature_K.error_bound + bus.surface_temperature_K
-    coolant_error_K = sensors.coolant_temperature_K.error_bound + bus.coolant_temperature_K
-    cooling_error_W = sensors.cooling_power_W.error_bound + bus.cooling_power_W
 
     # How fast each left-hand side can fall at a held current; the terms with a product of core
     # temperature and current are bounded by the largest current, falling with a warming core.
@@ -97,21 +106,39 @@ def sampling_margins(
         )
         + np.abs(constants.a8_per_As2) * coupling
     )
-    core_rounding, surface_rounding = rounding_allowances(cell, preset)
     return Margins(
-        voltage_V=_plain(steepest_V * soc_change),
-        soc_per_s=_plain(preset.gains.alpha1_per_s * soc_change),
+        voltage_V=_plain(_voltage_rise_V(cell, preset, bus, soc_change) + allowances.voltage_V),
+        soc_per_s=_plain(preset.gains.alpha1_per_s * soc_change + allowances.soc_per_s),
         core_K_per_s=_plain(
-            held_s * core_fall + constants.a1_per_s * surface_error_K + core_rounding
+            held_s * core_fall + constants.a1_per_s * errors.surface_K + allowances.core_K_per_s
         ),
         surface_K_per_s2=_plain(
             held_s * surface_fall
-            + np.abs(constants.a5_per_s2) * surface_error_K
-            + np.abs(constants.a6_per_s2) * coolant_error_K
-            + constants.a10_K_per_Ws2 * cooling_error_W
-            + surface_rounding
+            + np.abs(constants.a5_per_s2) * errors.surface_K
+            + np.abs(constants.a6_per_s2) * errors.coolant_K
+            + constants.a10_K_per_Ws2 * errors.cooling_W
+            + allowances.surface_K_per_s2
         ),
     )
+
+
+def _voltage_rise_V(
+    cell: CellParameters, preset: Preset, bus: BusQuantisation, soc_change: Any
+) -> Any:
+    """Largest rise of the open-circuit voltage by a charge, where the voltage limits the current.
+
+    It does from where the strongest current would exceed the limit at the end of the hold, up to
+    where the cell rests at the limit or is complete. The table as the firmware has it, in float32,
+    lies a little aside.
+    """
+    limits = preset.limits
+    soc_change = soc_change + CONSTANT_ROUNDINGS * UNIT
+    free_V = limits.max_voltage_V - cell.ohmic_resistance_ohm * strongest_current_A(preset, bus)
+    first_soc = np.where(
+        free_V >= cell.ocv.voltage_V[-1], np.inf, cell.ocv.soc_at(free_V) - soc_change
+    )
+    last_soc = np.minimum(cell.ocv.soc_at(limits.max_voltage_V), limits.completion_soc)
+    return cell.ocv.largest_rise_V(soc_change, np.maximum(first_soc, 0.0), last_soc)
 
 
 def _plain(value: Any) -> Any:

@@ -1,6 +1,6 @@
-"""What float32 arithmetic in the firmware can take from the thermal constraints.
+"""What float32 arithmetic in the firmware can take from the four constraints.
 
-Every term of a left-hand side is rounded a few times on its way (coefficient, difference, product,
+Every term of a left-hand side is rounded a few times on its way (constant, difference, product,
 sums, root, and the current itself), each time by at most half a unit in the last place. So the
 exact left-hand side at the decided current falls short of what the firmware took it for by no more
 than ROUNDINGS such units of the largest that its terms can be.
@@ -8,29 +8,42 @@ than ROUNDINGS such units of the largest that its terms can be.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from bms.barrier.constants import barrier_constants
 from bms.cell import CellParameters
+from bms.decision import ConstraintMargins
 from bms.presets.schema import Preset
 
 UNIT = 2.0**-24
 """Largest relative error of rounding to float32."""
-ROUNDINGS = 16
+ARITHMETIC_ROUNDINGS = 13
+"""Of a decision by constants as they are in the firmware."""
+CONSTANT_ROUNDINGS = 3
+"""Of the constants themselves, with sums of two."""
+ROUNDINGS = ARITHMETIC_ROUNDINGS + CONSTANT_ROUNDINGS
 
 
-def rounding_allowances(cell: CellParameters, preset: Preset) -> tuple[Any, Any]:
-    """Allowances of the core (K/s) and the surface constraint (K/s^2) within the operating box.
+def rounding_allowances(
+    cell: CellParameters, preset: Preset, roundings: int = ROUNDINGS
+) -> ConstraintMargins:
+    """Allowances of the four constraints within the operating box (V, 1/s, K/s, K/s^2).
 
-    The estimation error counts as one more difference of temperatures.
+    The estimation error counts as one more difference of temperatures. Rounding of the counted
+    charge is in its own error bound.
     """
     a, gains, box = barrier_constants(cell, preset), preset.gains, preset.operating_box
-    hottest_K = max(box.surface_temperature_K[1], preset.limits.max_core_temperature_K)
+    limits = preset.limits
+    hottest_K = max(box.surface_temperature_K[1], limits.max_core_temperature_K)
     span_K = hottest_K - min(box.coolant_temperature_K[0], box.surface_temperature_K[0])
-    current_A, cooling_W = -preset.limits.reference_current_A, box.cooling_power_W[1]
+    current_A, cooling_W = -limits.reference_current_A, box.cooling_power_W[1]
     heat_K = (hottest_K + span_K) * current_A
+    voltage = limits.max_voltage_V + cell.ocv.voltage_V[-1] + cell.ohmic_resistance_ohm * current_A
+    soc = (
+        gains.alpha1_per_s * limits.max_soc
+        + preset.uncertainty.soc_per_s
+        + current_A / cell.capacity_As
+    )
     core = (
         (2.0 * a.a1_per_s + 2.0 * gains.core_gain_per_s(cell)) * span_K
         + preset.uncertainty.core_K_per_s
@@ -44,4 +57,6 @@ def rounding_allowances(cell: CellParameters, preset: Preset) -> tuple[Any, Any]
         + np.abs(a.a8_per_As2) * heat_K
         + np.abs(a.a9_K_per_A2s2) * current_A**2
     )
-    return ROUNDINGS * UNIT * core, ROUNDINGS * UNIT * surface
+    return ConstraintMargins(
+        *(roundings * UNIT * largest for largest in (voltage, soc, core, surface))
+    )

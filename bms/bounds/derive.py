@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bms.arrays import Array
-from bms.barrier.margins import BusQuantisation
+from bms.barrier import BusQuantisation
 from bms.bounds.conformal import CONFIDENCE, over_blocks, over_profiles
 from bms.bounds.readings import measurement_error_K
 from bms.bounds.record import ErrorBounds

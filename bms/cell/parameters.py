@@ -39,9 +39,25 @@ class OpenCircuitVoltage:
         """Voltage in V at a state of charge of any shape; held constant outside 0..1."""
         return np.interp(np.asarray(soc, dtype=np.float64), self.soc, self.voltage_V)
 
-    def slopes_V(self) -> Array:
-        """Slope dV/dSoC in V of each table segment."""
-        return np.diff(self.voltage_V) / np.diff(self.soc)
+    def soc_at(self, voltage_V: npt.ArrayLike) -> Array:
+        """State of charge at which the voltage (V) is reached; 0 below and 1 above the table."""
+        return np.interp(np.asarray(voltage_V, dtype=np.float64), self.voltage_V, self.soc)
+
+    def largest_rise_V(
+        self, charge: npt.ArrayLike, first_soc: npt.ArrayLike, last_soc: npt.ArrayLike
+    ) -> Array:
+        """Largest rise of the voltage (V) by more charge, from any start between two; 0 if none.
+
+        All in state of charge, of any shapes that broadcast. The rise is linear in the start
+        between those where either end is a point of the table, so it is greatest at one of them.
+        """
+        charge, first, last = np.broadcast_arrays(charge, first_soc, last_soc)
+        points = np.asarray(self.soc).reshape(-1, *[1] * charge.ndim)
+        starts = np.clip(
+            np.concatenate([points + np.zeros_like(charge), points - charge]), first, last
+        )
+        rise_V = np.max(self(starts + charge) - self(starts), axis=0)
+        return np.where(first <= last, rise_V, 0.0)
 
 
 @strict

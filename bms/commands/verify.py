@@ -14,9 +14,18 @@ from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands import options
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
-from bms.verification import CLASHING_DELTA4, PARTS, SLIPS, Formulas, Verification, slips_of
+from bms.verification import (
+    CLASHING_DELTA4,
+    LARGEST_BOXES,
+    PARTS,
+    SLIPS,
+    Formulas,
+    Verification,
+    slips_of,
+)
 from bms.verification import verify as certify
 from bms.verification.closed_loop import HORIZON_S, SlipCost, slip_cost
+from bms.verification.findings import Finding
 from bms.verification.search import CounterExample
 from bms.waiting import waiting
 
@@ -30,13 +39,17 @@ def verify(
     slips: Annotated[
         bool, typer.Option("--slips", help="Also charge with each slip and show what it costs.")
     ] = False,
+    boxes: Annotated[
+        int, typer.Option("--boxes", min=1, help="Boxes after which a barrier is given up.")
+    ] = LARGEST_BOXES,
     as_json: options.JsonOption = False,
 ) -> int:
     """Certify that no decision lets a limit be crossed before the next decision acts.
 
     Branch and bound in interval arithmetic over all states (K), currents (A) and cooling (W), with
     all disturbances, reading errors and estimation errors at their bounds. Exit code 1 when a
-    barrier cannot be certified; a counter-example is a state that fails in simulation.
+    barrier cannot be certified, with the reason, the state and what to change; a counter-example is
+    a state that fails in simulation.
 
     Example: bms verify --preset lin2014 --json
     """
@@ -44,9 +57,9 @@ def verify(
     costs = []
     shown = ((), *((slip,) for slip in (*SLIPS, CLASHING_DELTA4)), SLIPS) if slips else ()
     with waiting("verifying", (1 + len(shown)) * PARTS + len(shown), "parts") as wait:
-        result = certify(*pair, slips_of(formulas), note=wait.begin)
+        result = certify(*pair, slips_of(formulas), boxes, note=wait.begin)
         for chosen in shown:
-            certified = certify(*pair, chosen, note=wait.begin).certified
+            certified = certify(*pair, chosen, boxes, note=wait.begin).certified
             wait.begin("what slips cost in a charge")
             costs.append(slip_cost(*pair, chosen, certified))
     if as_json:
@@ -91,8 +104,17 @@ def _print(result: Verification) -> None:
                 f"{barrier.name}: not shown for "
                 + ", ".join(f"{name} {a:.3f}..{b:.3f}" for name, a, b in sides)
             )
+        if barrier.certificate.by_history:
+            console.print(
+                f"{barrier.name}: the hold is long for this cell, so that the fall within it is "
+                "bounded by that of any history from rest"
+            )
         if barrier.outside is not None:
             console.print(f"{barrier.name}: beyond its domain {_example(barrier.outside)}")
+        if barrier.name in result.refusals:
+            console.print(
+                f"{barrier.name}: NOT certified: {_finding(result.refusals[barrier.name])}"
+            )
     margins = ", ".join(f"{name} {value:.4g}" for name, value in result.margins.items())
     console.print(f"margins: {margins}; error bound {result.error_bound_K:.4f} K")
     part = result.fallback
@@ -106,12 +128,19 @@ def _print(result: Verification) -> None:
         f"most {worst}; {part.best_current_A:.2f} A would heat the core "
         f"{part.best_gain_K_per_s:.1e} K/s less"
     )
+    for obstacle in result.obstacles:
+        console.print(f"charge: {_finding(obstacle)}")
     verdict = "certified" if result.certified else "NOT certified"
     formulas = ", ".join(result.slips) or "corrected"
     console.print(
         f"{result.preset} ({formulas}): {verdict} for {result.held_s:g} s from each reading, "
         f"{result.wall_time_s:.1f} s"
     )
+
+
+def _finding(finding: Finding) -> str:
+    state = ", ".join(f"{name} {value:.6g}" for name, value in finding.state.items())
+    return f"{finding.reason} (at {state}); {finding.change}"
 
 
 def _print_costs(costs: list[SlipCost]) -> None:

@@ -97,6 +97,11 @@ class Boxes:
         lower_high[rows, side] = middle
         return Boxes.joined([Boxes(self.low, lower_high), Boxes(upper_low, self.high)])
 
+    def middles(self) -> Boxes:
+        """The middle of every box, as a box without extent."""
+        middle = 0.5 * (self.low + self.high)
+        return Boxes(middle, middle)
+
     def batches(self, largest: int) -> Iterator[Boxes]:
         """The boxes in their order, at most so many at a time."""
         for start in range(0, len(self), largest):

@@ -14,12 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from bms.barrier import BusQuantisation
-from bms.barrier.margins import soc_error_bound
+from bms.barrier.readings import reading_errors, soc_error_bound
 from bms.cell import CellState, Disturbance, integrate_step, terminal_voltage_V
 from bms.model.model_file import KanModel
 from bms.presets import Preset
-from bms.verification.conditions import firmware_constants, reading_errors
+from bms.verification.conditions import firmware_constants
 from bms.verification.decision import decide
 from bms.verification.slips import Slip, with_slips
 
@@ -83,7 +82,7 @@ def _charges(
         DISTURBED * bounds.coolant_K_per_s,
     )
     estimation_K = ESTIMATES * constants["estimation_error_bound_K"]
-    counting = DISTURBED * soc_error_bound(cell, preset, BusQuantisation())
+    counting = DISTURBED * soc_error_bound(cell, preset)
     current_A = np.zeros(8)
     peaks = [start_K, start_K, np.full(8, -np.inf)]
     done_s = np.full(8, np.inf)
@@ -101,7 +100,7 @@ def _charges(
         wanted_A = np.maximum(
             limits.reference_current_A, current_A - limits.current_growth_A_per_s * period_s
         )
-        lower_A, upper_A, _ = decide(preset, constants, reading, cooling_W, wanted_A)
+        lower_A, upper_A, _ = decide(constants, reading, cooling_W, wanted_A)
         current_A = np.where((lower_A <= upper_A) & ~complete, lower_A, 0.0)
         state = integrate_step(cell, state, current_A, cooling_W, period_s, disturbance)
         voltage_V = terminal_voltage_V(cell, state.soc, current_A)

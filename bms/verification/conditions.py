@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from bms.barrier import BusQuantisation, barrier_constants
+from bms.barrier import barrier_constants
 from bms.barrier.machinery import check_gains
+from bms.cell import OpenCircuitVoltage
 from bms.firmware.calibration import calibration_block
 from bms.model.model_file import KanModel
 from bms.presets import Preset
@@ -82,30 +83,11 @@ class Condition:
 
 
 @dataclass(frozen=True)
-class ReadingErrors:
-    """Largest error of each reading on the bus, from sensor and quantisation."""
-
-    surface_K: float
-    coolant_K: float
-    cooling_W: float
-
-
-@dataclass(frozen=True)
 class Chain:
     """Gains of the surface barrier's chain psi = B4' + first B4, psi' + second psi >= 0."""
 
     first_per_s: float
     second_per_s: float
-
-
-def reading_errors(preset: Preset) -> ReadingErrors:
-    """Sensor error and half a step on the bus."""
-    bus, sensors = BusQuantisation(), preset.sensors
-    return ReadingErrors(
-        sensors.surface_temperature_K.error_bound + bus.surface_temperature_K,
-        sensors.coolant_temperature_K.error_bound + bus.coolant_temperature_K,
-        sensors.cooling_power_W.error_bound + bus.cooling_power_W,
-    )
 
 
 def chains(preset: Preset) -> tuple[Chain, Chain]:
@@ -131,13 +113,18 @@ def required_conditions(preset: Preset) -> tuple[Condition, Condition]:
 
 
 def firmware_constants(preset: Preset, model: KanModel) -> dict[str, Any]:
-    """The scalars that the firmware decides by, read back from its calibration block."""
-    block = calibration_block(preset, model, compiled_in=False).rcbf
+    """What the firmware decides by, read back from its calibration block: scalars and table."""
+    calibration = calibration_block(preset, model, compiled_in=False)
+    block = calibration.rcbf
     names = [name for name in dir(block) if not name.startswith("ocv_")]
     limits = ("max_core_temperature_K", "max_surface_temperature_K")
     return {
         **{name: getattr(block, name) for name in names if name not in limits},
         **{name: getattr(block, name).high_K + getattr(block, name).low_K for name in limits},
+        "ocv": OpenCircuitVoltage(
+            tuple(block.ocv_soc[0 : block.ocv_points]), tuple(block.ocv_V[0 : block.ocv_points])
+        ),
+        "completion_soc": calibration.completion_soc,
         "core_error_term": ErrorTerm.ABSOLUTE,
         "surface_error_term": ErrorTerm.ABSOLUTE,
     }

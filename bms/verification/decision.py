@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 
 from bms.cell import CellState
-from bms.presets import Preset
 from bms.verification.conditions import decided_conditions
 
 
 def decide(
-    preset: Preset,
     constants: Mapping[str, Any],
     reading: CellState,
     cooling_W: Any,
@@ -27,8 +25,7 @@ def decide(
     k = constants
     soc, core_K, surface_K, coolant_K = reading
     voltage_A = (
-        -(k["max_voltage_V"] - preset.cell.ocv(soc) - k["voltage_margin_V"])
-        / k["ohmic_resistance_ohm"]
+        -(k["max_voltage_V"] - k["ocv"](soc) - k["voltage_margin_V"]) / k["ohmic_resistance_ohm"]
     )
     soc_A = -k["capacity_As"] * (
         k["alpha1_per_s"] * (k["max_soc"] - soc)

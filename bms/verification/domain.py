@@ -16,6 +16,7 @@ import numpy as np
 
 from bms.barrier.rates import Weights, heat_range_W, largest_rate
 from bms.cell import CellParameters
+from bms.errors import InputError
 from bms.presets import Preset
 from bms.verification.conditions import Chain, Condition
 from bms.verification.intervals import Interval
@@ -128,10 +129,20 @@ class Domain:
 
 
 def certified_domain(preset: Preset, condition: Condition, surface_chain: Chain) -> Domain:
-    """Domain of a preset for the condition that has to hold in it."""
+    """Domain of a preset for the condition that has to hold in it.
+
+    Raises InputError when the operating box lies above a limit.
+    """
     box, limits = preset.operating_box, preset.limits
     surface_low, surface_high = box.surface_temperature_K
     surface_high = min(surface_high, limits.max_surface_temperature_K)
+    for limit in ("max_core_temperature_K", "max_surface_temperature_K"):
+        if getattr(limits, limit) <= surface_low:
+            raise InputError(
+                f"preset '{preset.name}': operating_box.surface_temperature_K begins at "
+                f"{surface_low:g}, where limits.{limit} is {getattr(limits, limit):g}: no state is "
+                "left to certify; lower the begin of the box or raise the limit"
+            )
     coolant_low, coolant_high = box.coolant_temperature_K
     heat = heat_range_W(preset.cell, preset)
     return Domain(

@@ -1,4 +1,9 @@
-"""Voltage and state of charge over one decision: one dimension, shown on a fine partition."""
+"""Voltage and state of charge over one decision: piecewise linear in the counted charge.
+
+Margins and certificates share what a hold brings and what counting, arithmetic and bus can take
+(bms/barrier). The certificates do not use how the margins are put together: they follow each
+decision by the firmware's own constants to the end of its hold.
+"""
 
 from __future__ import annotations
 
@@ -7,41 +12,67 @@ from typing import Any
 
 import numpy as np
 
-from bms.barrier import BusQuantisation
-from bms.barrier.margins import soc_error_bound
+from bms.arrays import Array
+from bms.barrier import BUS
+from bms.barrier.margins import charge_taken_up, decision_allowances, strongest_current_A
+from bms.barrier.readings import soc_error_bound
+from bms.barrier.rounding import ARITHMETIC_ROUNDINGS
 from bms.presets import Preset
-from bms.verification.certificate import Certificate
+from bms.verification.certificate import Certificate, Shortfall
 
-PARTS = 200_000
-CURRENT_ERROR_A = 1e-3
-"""How far the float32 limits by voltage and charge may lie from exact ones (test_rcbf.py)."""
 ROUNDING_V = 1e-9
 """Far above the float64 rounding of the few operations on numbers of some volts."""
 
 
 def certify_voltage(preset: Preset, constants: Mapping[str, Any]) -> tuple[Certificate, float]:
-    """Certificate, and the least distance to the voltage limit in V, over all counted charges.
+    """Certificate, and the least distance to the limit in V (infinite where nothing charges).
 
-    For counted charge in [a, b] the current is at most what the constraint allows at a; at the end
-    of the hold the charge is at most b, its error, and what came in meanwhile.
+    For counted charge a, the current is what the constraint allows at a; at the end of the hold
+    the true charge is at most a, its error, and what came in meanwhile. The voltage is linear in a
+    between the points where any part of this has a kink, so it is highest at one of them. Where
+    no current is allowed the cell rests, at a charge to which a decision below has brought it.
     """
-    cell, limits = preset.cell, preset.limits
-    strongest_A = -limits.reference_current_A
-    edges = np.linspace(0.0, limits.completion_soc, PARTS + 1)
-    a, b = edges[:-1], edges[1:]
-    allowed_A = (constants["max_voltage_V"] - constants["voltage_margin_V"] - cell.ocv(a)) / (
-        constants["ohmic_resistance_ohm"]
+    cell, ocv, limits = preset.cell, constants["ocv"], preset.limits
+    resistance_ohm = constants["ohmic_resistance_ohm"]
+    strongest_A = strongest_current_A(preset, BUS)
+    full_V = (
+        constants["max_voltage_V"]
+        - constants["voltage_margin_V"]
+        + decision_allowances(cell, preset, BUS, ARITHMETIC_ROUNDINGS).voltage_V
     )
-    current_A = np.clip(allowed_A + CURRENT_ERROR_A, 0.0, strongest_A)
-    end_soc = b + _charge_error(preset) + _taken_up(preset, current_A)
-    distance_V = (
-        limits.max_voltage_V - cell.ocv(end_soc) - cell.ohmic_resistance_ohm * current_A
-    ) - ROUNDING_V
-    # Complete or without a safe current, the cell rests at its open-circuit voltage.
-    resting_V = limits.max_voltage_V - cell.ocv.voltage_V[-1]
-    open_boxes = int(np.count_nonzero(distance_V < 0.0)) + int(resting_V < 0.0)
-    certificate = Certificate("voltage", PARTS, open_boxes)
-    return certificate, float(min(np.min(distance_V), resting_V))
+    if not np.isfinite(full_V):
+        return Certificate("voltage", 1, 1, shortfall=Shortfall({}, full_V)), full_V
+    if full_V <= ocv.voltage_V[0]:
+        return Certificate("voltage", 1, 0), np.inf
+    error = soc_error_bound(cell, preset)
+
+    def current_A(counted: Array) -> Array:
+        return np.asarray(np.clip((full_V - ocv(counted)) / resistance_ohm, 0.0, strongest_A))
+
+    def end_soc(counted: Array) -> Array:
+        taken_up = charge_taken_up(cell, preset, BUS, current_A(counted))
+        return np.asarray(counted + error + taken_up)
+
+    last = min(float(ocv.soc_at(full_V)), constants["completion_soc"])
+    kinks = [*ocv.soc, float(ocv.soc_at(full_V - resistance_ohm * strongest_A)), last]
+    counted = np.unique([kink for kink in kinks if 0.0 <= kink <= last])
+    counted = np.concatenate([counted, _crossings(counted, end_soc(counted), cell.ocv.soc)])
+    current, end = current_A(counted), end_soc(counted)
+    distance_V = limits.max_voltage_V - cell.ocv(end) - cell.ohmic_resistance_ohm * current
+    nearest = int(np.argmin(distance_V))
+    open_points = int(np.count_nonzero(~(distance_V >= ROUNDING_V)))
+    state = {
+        "counted_soc": float(counted[nearest]),
+        "current_A": -float(current[nearest]),
+        "soc_at_end": float(end[nearest]),
+    }
+    least_V = float(distance_V[nearest])
+    return Certificate(
+        "voltage",
+        len(counted),
+        open_points,
+        shortfall=Shortfall(state, ROUNDING_V - least_V) if open_points else None,
+    ), least_V
 
 
 def certify_soc(preset: Preset, constants: Mapping[str, Any]) -> Certificate:
@@ -50,25 +81,33 @@ def certify_soc(preset: Preset, constants: Mapping[str, Any]) -> Certificate:
     The decision leaves u/C + alpha1 (s_max - counted) >= margin; the counted charge differs from
     the true one at any instant of the hold by the counting error and what has come in since.
     """
-    strongest_A = -preset.limits.reference_current_A
-    moved = _charge_error(preset) + _taken_up(preset, strongest_A)
-    alpha1, capacity_As = constants["alpha1_per_s"], preset.cell.capacity_As
-    reserve = constants["soc_margin_per_s"] - alpha1 * moved - CURRENT_ERROR_A / capacity_As
+    k, cell, limits = constants, preset.cell, preset.limits
+    strongest_A = strongest_current_A(preset, BUS)
+    moved = soc_error_bound(cell, preset) + charge_taken_up(cell, preset, BUS, strongest_A)
+    alpha1 = preset.gains.alpha1_per_s
+    # Required less decided condition, coefficient by coefficient, at the worst end of each range.
+    gain = alpha1 - k["alpha1_per_s"]
+    left = (
+        k["soc_margin_per_s"]
+        + (k["soc_uncertainty_per_s"] - preset.uncertainty.soc_per_s)
+        + min(0.0, strongest_A * (1.0 / k["capacity_As"] - 1.0 / cell.capacity_As))
+        + min(gain * limits.max_soc, gain * (limits.max_soc - limits.completion_soc))
+        - k["alpha1_per_s"] * (k["max_soc"] - limits.max_soc)
+        - alpha1 * moved
+        - decision_allowances(cell, preset, BUS, ARITHMETIC_ROUNDINGS).soc_per_s
+    )
     # Up to completion the charge may also simply be too far from its limit to get there.
-    far = preset.limits.completion_soc + moved < preset.limits.max_soc
-    held = reserve >= 0.0 and constants["soc_uncertainty_per_s"] >= preset.uncertainty.soc_per_s
-    return Certificate("soc", 1, 0 if held or far else 1)
+    far = k["completion_soc"] + moved < limits.max_soc
+    if left >= 0.0 or far:
+        return Certificate("soc", 1, 0)
+    state = {"counted_soc": limits.completion_soc, "current_A": -strongest_A}
+    return Certificate("soc", 1, 1, shortfall=Shortfall(state, float(-left)))
 
 
-def _charge_error(preset: Preset) -> float:
-    return soc_error_bound(preset.cell, preset, BusQuantisation())
-
-
-def _taken_up(preset: Preset, current_A: Any) -> Any:
-    """Charge taken up until the hold ends: before it acts at any current, then at the decided."""
-    timing, strongest_A = preset.timing, -preset.limits.reference_current_A
-    held_s = timing.sampling_period_s + timing.delay_s
-    # A decision that acts at once may act until the end of the hold; one that is delayed follows
-    # another. The greater of both is the delayed one, for no current is above the strongest.
-    charge_As = timing.delay_s * strongest_A + timing.sampling_period_s * current_A
-    return charge_As / preset.cell.capacity_As + held_s * preset.uncertainty.soc_per_s
+def _crossings(counted: Array, end: Array, points: tuple[float, ...]) -> Array:
+    """Counted charges at which the hold ends at a point of the table, between those given."""
+    steps, rises = np.diff(counted)[:, None], np.diff(end)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (np.asarray(points) - end[:-1, None]) / rises
+    inside = (share > 0.0) & (share < 1.0)
+    return np.asarray((counted[:-1, None] + share * steps)[inside])

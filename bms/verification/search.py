@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from bms.arrays import Array
-from bms.barrier import BusQuantisation
-from bms.barrier.margins import soc_error_bound
+from bms.barrier.readings import ReadingErrors, soc_error_bound
 from bms.cell import CellState, Disturbance, integrate_step, terminal_voltage_V
 from bms.verification.barriers import Barrier
-from bms.verification.conditions import Condition, ReadingErrors, decided_conditions
+from bms.verification.conditions import Condition, decided_conditions
 from bms.verification.decision import decide
 from bms.verification.domain import Domain, weights
 
@@ -52,6 +51,7 @@ def find_counter_example(
     errors: ReadingErrors,
     barrier: Barrier,
     rng: np.random.Generator,
+    samples: int = SAMPLES,
 ) -> CounterExample | None:
     """The worst of many simulated decisions from the edge of the safe set; None when all are safe.
 
@@ -60,12 +60,12 @@ def find_counter_example(
     heat, and the current acts for the whole hold.
     """
     preset = domain.preset
-    state, cooling_W = _edge_states(domain, barrier, rng)
+    state, cooling_W = _edge_states(domain, barrier, rng, samples)
     core_condition, surface_condition = decided_conditions(constants)
     condition = surface_condition if barrier is Barrier.SURFACE else core_condition
     slips = _favourable_errors(condition, errors)
     estimation_K = rng.choice([-1.0, 0.0, 1.0], state.soc.shape) * condition.error_bound_K
-    soc_error = soc_error_bound(preset.cell, preset, BusQuantisation())
+    soc_error = soc_error_bound(preset.cell, preset)
     reading = CellState(
         state.soc - soc_error,
         state.core_temperature_K + estimation_K,
@@ -73,9 +73,7 @@ def find_counter_example(
         state.coolant_temperature_K + slips.coolant_K,
     )
     reference_A = preset.limits.reference_current_A
-    current_A, upper_A, _ = decide(
-        preset, constants, reading, cooling_W + slips.cooling_W, reference_A
-    )
+    current_A, upper_A, _ = decide(constants, reading, cooling_W + slips.cooling_W, reference_A)
     rows = np.flatnonzero(current_A <= upper_A)
     if not len(rows):
         return None
@@ -152,19 +150,19 @@ def _barrier(
 
 
 def _edge_states(
-    domain: Domain, barrier: Barrier, rng: np.random.Generator
+    domain: Domain, barrier: Barrier, rng: np.random.Generator, samples: int
 ) -> tuple[CellState, Array]:
     """States of the domain with one barrier at zero (for the voltage: near its limit)."""
     limits, box, low, high = (
         domain.preset.limits, domain.preset.operating_box, domain.low, domain.high,
     )  # fmt: skip
-    soc = rng.uniform(0.05, limits.completion_soc, SAMPLES)
-    cooling_W = rng.uniform(low.cooling_W, high.cooling_W, SAMPLES)
-    surface_K = limits.max_surface_temperature_K - rng.uniform(0.0, 1.0, SAMPLES) ** 3 * (
+    soc = rng.uniform(0.05, limits.completion_soc, samples)
+    cooling_W = rng.uniform(low.cooling_W, high.cooling_W, samples)
+    surface_K = limits.max_surface_temperature_K - rng.uniform(0.0, 1.0, samples) ** 3 * (
         limits.max_surface_temperature_K - low.surface_K
     )
-    core_gap = rng.uniform(-1.0, 20.0, SAMPLES)
-    coolant_gap = rng.uniform(-2.0, 30.0, SAMPLES)
+    core_gap = rng.uniform(-1.0, 20.0, samples)
+    coolant_gap = rng.uniform(-2.0, 30.0, samples)
     if barrier is Barrier.CORE:
         core_gap = limits.max_core_temperature_K - surface_K
     elif barrier is Barrier.SURFACE:
@@ -172,9 +170,9 @@ def _edge_states(
         rest = domain.chain_value(surface_K, core_gap, 0.0)
         coolant_gap = rest / domain.surface_rate(0.0, 1.0)
     else:
-        surface_K = rng.uniform(low.surface_K, high.surface_K - 15.0, SAMPLES)
-        core_gap = np.zeros(SAMPLES)
-        coolant_gap = np.zeros(SAMPLES)
+        surface_K = rng.uniform(low.surface_K, high.surface_K - 15.0, samples)
+        core_gap = np.zeros(samples)
+        coolant_gap = np.zeros(samples)
     core_K, coolant_K = surface_K + core_gap, surface_K - coolant_gap
     inside = (core_K <= limits.max_core_temperature_K) & (coolant_K >= box.coolant_temperature_K[0])
     inside &= (coolant_K <= box.coolant_temperature_K[1]) & (surface_K >= low.surface_K)

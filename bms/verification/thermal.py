@@ -8,7 +8,10 @@ outward:
   held       the condition G holds long enough: G >= g at the reading and falls no faster than r, so
              the barrier, which obeys b' + lambda b = G, is not negative at any instant of the hold
 
-A box of which none can be shown is halved. What is left at the largest number of boxes is reported.
+A box of which none can be shown is halved. At first r is what the box can drift to within the hold.
+Where the hold is about as long as the cell's fast mode, that is more than a cell from rest can do;
+so after OWN_BOXES the domain's bound on the fall holds r down, too. What is left at the largest
+number of boxes is reported with its worst state.
 """
 
 from __future__ import annotations
@@ -19,47 +22,68 @@ from typing import Any
 import numpy as np
 
 from bms.arrays import Array, Mask
+from bms.barrier.readings import ReadingErrors
 from bms.verification.barriers import Barrier
 from bms.verification.boxes import Boxes
-from bms.verification.certificate import Certificate
-from bms.verification.conditions import Condition, ErrorTerm, ReadingErrors
+from bms.verification.certificate import Certificate, Shortfall
+from bms.verification.conditions import Condition, ErrorTerm
 from bms.verification.domain import Domain, Point, Rates, weights
+from bms.verification.drift import drift_gain_s, held_rates, largest_fall
 from bms.verification.intervals import Interval
 
 LARGEST_BATCH = 20_000
+OWN_BOXES = 30_000
+"""Boxes that are tried with their own drift alone."""
 
 
 @dataclass(frozen=True)
 class Case:
     """One barrier: what has to hold, what is decided by, and the barrier's own decay rate.
 
-    `rounding` is what the firmware's arithmetic can take from the decided condition, in its unit.
+    `allowance` is what arithmetic and bus can take from the decided condition, in its unit.
     """
 
     barrier: Barrier
     required: Condition
     decided: Condition
     decay_per_s: float
-    rounding: float
+    allowance: float
 
 
-def certify(domain: Domain, case: Case, errors: ReadingErrors, largest_boxes: int) -> Certificate:
+def certify(
+    domain: Domain,
+    case: Case,
+    errors: ReadingErrors,
+    largest_boxes: int,
+    own_boxes: int = OWN_BOXES,
+) -> Certificate:
     """Branch and bound for one barrier; stops undecided at largest_boxes."""
+    gain_s = drift_gain_s(domain)
     pending = [Boxes.whole(domain)]
-    examined = 0
+    examined, by_history = 0, False
     while pending and examined < largest_boxes:
         boxes = pending.pop()
+        by_history = examined >= own_boxes
         examined += len(boxes)
-        undecided = boxes[_are_undecided(domain, case, errors, boxes)]
+        missing = _missing(domain, case, errors, boxes, gain_s, by_history)
+        # What is no number is not shown.
+        undecided = boxes[~(missing <= 0.0)]
         halves = undecided.halved(_scores(domain, case, undecided))
         pending.extend(halves.batches(LARGEST_BATCH))
     left = Boxes.joined(pending)
+    if not len(left):
+        return Certificate(case.barrier.value, examined, 0, by_history=by_history)
+    middle = left.middles()
+    missing = _missing(domain, case, errors, middle, gain_s, True)
+    worst = int(np.argmax(missing))
     return Certificate(
         case.barrier.value,
         examined,
         len(left),
-        Point(*left.low.min(axis=0).tolist()) if len(left) else None,
-        Point(*left.high.max(axis=0).tolist()) if len(left) else None,
+        Point(*left.low.min(axis=0).tolist()),
+        Point(*left.high.max(axis=0).tolist()),
+        Shortfall(Point(*middle.low[worst].tolist())._asdict(), float(missing[worst])),
+        by_history,
     )
 
 
@@ -75,13 +99,19 @@ def held_integral(least: Any, fall: Any, decay_per_s: float, begin_s: float, end
     return (least - fall * begin_s) * grown - fall * moment
 
 
-def _are_undecided(domain: Domain, case: Case, errors: ReadingErrors, boxes: Boxes) -> Mask:
+def _missing(
+    domain: Domain, case: Case, errors: ReadingErrors, boxes: Boxes, gain_s: Array, by_history: bool
+) -> Array:
+    """What each box's condition lacks to last for the hold, in its unit.
+
+    Not positive where it lasts, minus infinity where it need not.
+    """
     gain = _reading_gain(case.decided, errors, boxes.current_A)
-    rates, enclosed = _held_rates(domain, boxes)
+    rates = held_rates(domain, gain_s, boxes)
     is_far = _core_is_far if case.barrier is Barrier.CORE else _surface_is_far
-    shown = is_far(domain, boxes, rates) | _are_held(domain, case, boxes, rates, gain)
-    undecided: Mask = ~(_are_excluded(domain, case, boxes, gain) | (enclosed & shown))
-    return undecided
+    needless = _are_excluded(domain, case, boxes, gain) | is_far(domain, boxes, rates)
+    missing = _lacking(domain, case, boxes, rates, gain, by_history)
+    return np.where(needless, -np.inf, missing)
 
 
 def _are_excluded(domain: Domain, case: Case, boxes: Boxes, gain: Any) -> Mask:
@@ -101,12 +131,14 @@ def _are_excluded(domain: Domain, case: Case, boxes: Boxes, gain: Any) -> Mask:
     )
     for flow in domain.flows:
         excluded |= flow.rate(boxes.core_gap_K, boxes.coolant_gap_K).low > flow.largest
-    excluded |= boxes.value(case.decided).high + gain + case.rounding < 0.0
+    excluded |= boxes.value(case.decided).high + gain + case.allowance < 0.0
     return excluded
 
 
-def _are_held(domain: Domain, case: Case, boxes: Boxes, rates: Rates, gain: Any) -> Mask:
-    """Whether the required condition holds long enough, if the rates stay within the given ones."""
+def _lacking(
+    domain: Domain, case: Case, boxes: Boxes, rates: Rates, gain: Any, by_history: bool
+) -> Array:
+    """Least that the required condition has to be at the reading, less what the decision leaves."""
     required, slope = case.required, weights(case.required)
     fall = -(
         rates.core * (boxes.current_A * required.coupling + slope.core)
@@ -114,16 +146,22 @@ def _are_held(domain: Domain, case: Case, boxes: Boxes, rates: Rates, gain: Any)
         + rates.coolant * slope.coolant
     )
     steepest = np.maximum(fall.high, 0.0)
-    least = np.maximum(
+    if by_history:
+        steepest = np.minimum(steepest, largest_fall(domain, required, boxes))
+    left = np.maximum(
         boxes.value(required).low,
-        boxes.value(required.less(case.decided)).low - gain - case.rounding,
+        boxes.value(required.less(case.decided)).low - gain - case.allowance,
     )
-    integrals = [
-        held_integral(least, steepest, case.decay_per_s, begin_s, domain.held_s)
-        for begin_s in (0.0, domain.preset.timing.delay_s)
-    ]
-    held: Mask = np.all([integral >= 0.0 for integral in integrals], axis=0)
-    return held
+    begins_s = (0.0, domain.preset.timing.delay_s)
+    lacking: Array = np.max(
+        [
+            -held_integral(left, steepest, case.decay_per_s, begin_s, domain.held_s)
+            / held_integral(1.0, 0.0, case.decay_per_s, begin_s, domain.held_s)
+            for begin_s in begins_s
+        ],
+        axis=0,
+    )
+    return lacking
 
 
 def _core_is_far(domain: Domain, boxes: Boxes, rates: Rates) -> Mask:
@@ -147,38 +185,6 @@ def _surface_is_far(domain: Domain, boxes: Boxes, rates: Rates) -> Mask:
     )
     far: Mask = worst - moved > 0.0
     return far
-
-
-def _held_rates(domain: Domain, boxes: Boxes) -> tuple[Rates, Mask]:
-    """Enclosure of the rates over the hold, and where it is proven.
-
-    A first guess of twice the drift proves itself where the drift within it is no larger. From then
-    on each pass may narrow it, for what drifts in one direction only does so over the whole hold.
-    """
-    held_s, cooling_W = domain.held_s, boxes.cooling_W
-    core_gap, coolant_gap = boxes.core_gap_K, boxes.coolant_gap_K
-    start = domain.rates(core_gap, coolant_gap, cooling_W)
-    guess_K = Rates(*(2.0 * held_s * rate.magnitude for rate in start))
-    rates = domain.rates(
-        core_gap.widened(guess_K.core + guess_K.surface),
-        coolant_gap.widened(guess_K.surface + guess_K.coolant),
-        cooling_W,
-    )
-    drifts_K = [held_s * rate.magnitude for rate in rates]
-    enclosed: Mask = np.all([drift <= guess for drift, guess in zip(drifts_K, guess_K)], axis=0)
-    for _ in range(2):
-        rates = domain.rates(
-            _drifted(core_gap, rates.core - rates.surface, held_s),
-            _drifted(coolant_gap, rates.surface - rates.coolant, held_s),
-            cooling_W,
-        )
-    return rates, enclosed
-
-
-def _drifted(start: Interval, rate: Interval, held_s: float) -> Interval:
-    return start + Interval(
-        np.minimum(rate.low, 0.0) * held_s, np.maximum(rate.high, 0.0) * held_s
-    ).widened(0.0)
 
 
 def _reading_gain(decided: Condition, errors: ReadingErrors, current: Interval) -> Any:

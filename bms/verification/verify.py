@@ -9,7 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from bms.barrier.rounding import rounding_allowances
+from bms.barrier import BUS
+from bms.barrier.margins import decision_allowances
+from bms.barrier.readings import reading_errors
+from bms.barrier.rounding import ARITHMETIC_ROUNDINGS
 from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.verification.barriers import Barrier
@@ -18,25 +21,26 @@ from bms.verification.conditions import (
     chains,
     decided_conditions,
     firmware_constants,
-    reading_errors,
     required_conditions,
 )
 from bms.verification.domain import Domain, certified_domain
 from bms.verification.electrical import certify_soc, certify_voltage
 from bms.verification.fallback import Fallback, infeasible_part
-from bms.verification.search import CounterExample, find_counter_example
+from bms.verification.findings import Finding, obstacles, refusal
+from bms.verification.search import SAMPLES, CounterExample, find_counter_example
 from bms.verification.slips import Slip, with_slips
 from bms.verification.thermal import Case, certify
 
 LARGEST_BOXES = 400_000
 PARTS = 4
 """Of a verification: what is electrical, the core, and the surface with two chains."""
-MARGINS = (
-    "voltage_margin_V",
-    "soc_margin_per_s",
-    "core_margin_K_per_s",
-    "surface_margin_K_per_s2",
-)
+MARGINS = {
+    "voltage": "voltage_margin_V",
+    "soc": "soc_margin_per_s",
+    "core": "core_margin_K_per_s",
+    "surface": "surface_margin_K_per_s2",
+}
+"""Names of the constants by what certificates are of."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,11 @@ class BarrierResult:
 
 @dataclass(frozen=True)
 class Verification:
-    """What was shown of a preset's decisions; `certified` when every barrier is."""
+    """What was shown of a preset's decisions; `certified` when every barrier is.
+
+    `refusals` say why not, by the barrier's name; `obstacles` what keeps a charge, safe as it is,
+    from beginning or from being finished.
+    """
 
     preset: str
     model: str
@@ -65,13 +73,15 @@ class Verification:
     error_bound_K: float
     margins: Mapping[str, float]
     barriers: tuple[BarrierResult, ...]
+    refusals: Mapping[str, Finding]
     fallback: Fallback
+    obstacles: tuple[Finding, ...]
     wall_time_s: float
 
     @property
     def certified(self) -> bool:
         """Whether every barrier is kept and no simulated decision contradicts it."""
-        return all(b.certificate.holds and b.counter_example is None for b in self.barriers)
+        return not self.refusals
 
     def as_dict(self) -> dict[str, Any]:
         """Content for JSON: plain numbers, lists and mappings."""
@@ -86,7 +96,9 @@ class Verification:
             "boxes": sum(b.certificate.boxes for b in self.barriers),
             "wall_time_s": self.wall_time_s,
             "barriers": {b.name: _barrier_dict(b) for b in self.barriers},
+            "refusals": {name: asdict(finding) for name, finding in self.refusals.items()},
             "without_safe_current": asdict(self.fallback),
+            "obstacles": [asdict(obstacle) for obstacle in self.obstacles],
         }
 
 
@@ -95,21 +107,24 @@ def verify(
     model: KanModel,
     slips: tuple[Slip, ...] = (),
     largest_boxes: int = LARGEST_BOXES,
+    samples: int = SAMPLES,
     note: Callable[[str], None] = lambda part: None,
 ) -> Verification:
     """Certify the four barriers over one decision for the firmware's own constants.
 
-    With slips, for constants that contain them; a barrier is given up beyond largest_boxes. `note`
-    is told which of the PARTS comes next. Raises what loading the calibration raises.
+    With slips, for constants that contain them; a barrier is given up beyond largest_boxes, and
+    each search for a counter-example draws so many samples. `note` is told which of the PARTS comes
+    next. Raises what loading the calibration raises.
     """
     begin = time.monotonic()
     note("voltage, state of charge and domains")
     constants = with_slips(preset, firmware_constants(preset, model), slips)
     errors = reading_errors(preset)
-    cases = _thermal_cases(preset, constants)
+    cases = thermal_cases(preset, constants)
 
     def search(domain: Domain, barrier: Barrier) -> CounterExample | None:
-        return find_counter_example(domain, constants, errors, barrier, np.random.default_rng(0))
+        random = np.random.default_rng(0)
+        return find_counter_example(domain, constants, errors, barrier, random, samples)
 
     core_domain, surface_domain = cases[0][0], cases[1][0]
     voltage, _ = certify_voltage(preset, constants)
@@ -130,30 +145,43 @@ def verify(
                 search(replace(domain, flows=()), case.barrier),
             )
         )
+    slip_names = tuple(slip.name for slip in slips)
+    refusals = {}
+    for result in results:
+        margin = MARGINS[result.certificate.name]
+        finding = refusal(
+            result.certificate, result.counter_example, (margin, constants[margin]), slip_names
+        )
+        if finding is not None:
+            refusals[result.name] = finding
+    fallback = infeasible_part(surface_domain, decided_conditions(constants))
     return Verification(
         preset=preset.name,
         model=model.hash[:8],
-        slips=tuple(slip.name for slip in slips),
+        slips=slip_names,
         held_s=core_domain.held_s,
         error_bound_K=constants["estimation_error_bound_K"],
-        margins={name: constants[name] for name in MARGINS},
-        barriers=tuple(results),
-        fallback=infeasible_part(surface_domain, decided_conditions(constants)),
+        margins={name: constants[name] for name in MARGINS.values()},
+        barriers=results,
+        refusals=refusals,
+        fallback=fallback,
+        obstacles=obstacles(preset, constants, fallback),
         wall_time_s=time.monotonic() - begin,
     )
 
 
-def _thermal_cases(preset: Preset, constants: Mapping[str, Any]) -> list[tuple[Domain, Case]]:
+def thermal_cases(preset: Preset, constants: Mapping[str, Any]) -> list[tuple[Domain, Case]]:
     """The core barrier, then the surface barrier by both of its chains, with their domains."""
     core, surface = required_conditions(preset)
     decided_core, decided_surface = decided_conditions(constants)
-    core_rounding, surface_rounding = rounding_allowances(preset.cell, preset)
+    allowances = decision_allowances(preset.cell, preset, BUS, ARITHMETIC_ROUNDINGS)
     loose, strict = chains(preset)
     gain_per_s = preset.gains.core_gain_per_s(preset.cell)
-    cases = [(loose, Case(Barrier.CORE, core, decided_core, gain_per_s, core_rounding))]
+    core_case = Case(Barrier.CORE, core, decided_core, gain_per_s, allowances.core_K_per_s)
+    cases = [(loose, core_case)]
     for chain in (loose, strict):
-        decay_per_s = chain.second_per_s
-        case = Case(Barrier.SURFACE, surface, decided_surface, decay_per_s, surface_rounding)
+        decay_per_s, allowance = chain.second_per_s, allowances.surface_K_per_s2
+        case = Case(Barrier.SURFACE, surface, decided_surface, decay_per_s, allowance)
         cases.append((chain, case))
     return [(certified_domain(preset, case.required, chain), case) for chain, case in cases]
 
@@ -171,6 +199,7 @@ def _barrier_dict(result: BarrierResult) -> dict[str, Any]:
         "certified": certificate.holds,
         "boxes": certificate.boxes,
         "open_boxes": certificate.open_boxes,
+        "by_history": certificate.by_history,
     }
     if certificate.open_low is not None and certificate.open_high is not None:
         content["open_part"] = {
@@ -190,6 +219,6 @@ def _barrier_dict(result: BarrierResult) -> dict[str, Any]:
             "flow_limits": [asdict(flow) for flow in domain.flows],
         }
     for name in ("counter_example", "outside"):
-        example = getattr(result, name)
-        content[name] = None if example is None else asdict(example)
+        part = getattr(result, name)
+        content[name] = None if part is None else asdict(part)
     return content

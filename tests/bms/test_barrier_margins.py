@@ -9,11 +9,11 @@ from itertools import product
 import numpy as np
 import pytest
 
-from bms.barrier import Margins, barrier_constants, sampling_margins
+from bms.barrier import BusQuantisation, barrier_constants, sampling_margins
 from bms.barrier.constraints import charging_current_A, left_hand_sides
-from bms.barrier.margins import BusQuantisation, soc_error_bound
 from bms.barrier.rates import Weights, heat_range_W, largest_rate
-from bms.barrier.rounding import rounding_allowances
+from bms.barrier.readings import soc_error_bound
+from bms.barrier.rounding import ROUNDINGS, UNIT, rounding_allowances
 from bms.cell import CellState, Disturbance, integrate_step, rates, terminal_voltage_V
 from bms.presets import load_preset, preset_names
 from bms.presets.schema import Uncertainty
@@ -290,6 +290,12 @@ def test_with_no_time_and_perfect_sensors_only_arithmetic_needs_a_margin(preset)
         timing=replace(preset.timing, sampling_period_s=1e-12, delay_s=0.0),
         sensors=replace(preset.sensors, **perfect),
     )
-    margins = sampling_margins(preset.cell, ideal, BusQuantisation(0.0, 0.0, 0.0, 0.0))
+    margins = sampling_margins(preset.cell, ideal, BusQuantisation(*[0.0] * 6))
     rounding = rounding_allowances(preset.cell, preset)
-    assert vars(margins) == pytest.approx(vars(Margins(0.0, 0.0, *rounding)), abs=1e-10)
+    assert margins.core_K_per_s == pytest.approx(rounding.core_K_per_s, abs=1e-10)
+    assert margins.surface_K_per_s2 == pytest.approx(rounding.surface_K_per_s2, abs=1e-10)
+    counting = ROUNDINGS * UNIT
+    counted_per_s = preset.gains.alpha1_per_s * counting
+    assert margins.soc_per_s == pytest.approx(rounding.soc_per_s + counted_per_s, abs=1e-12)
+    steepest_V = np.max(np.diff(preset.cell.ocv.voltage_V) / np.diff(preset.cell.ocv.soc))
+    assert rounding.voltage_V < margins.voltage_V < rounding.voltage_V + 1.5 * steepest_V * counting

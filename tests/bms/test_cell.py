@@ -159,7 +159,33 @@ def test_ocv_table_follows_the_measurement(name):
 def test_ocv_is_linear_between_points_and_constant_outside():
     ocv = OpenCircuitVoltage((0.0, 0.5, 1.0), (2.0, 3.0, 3.5))
     assert ocv([-1.0, 0.25, 0.5, 0.75, 2.0]).tolist() == [2.0, 2.5, 3.0, 3.25, 3.5]
-    assert ocv.slopes_V().tolist() == [2.0, 1.0]
+    assert ocv.soc_at([1.0, 2.5, 3.25, 4.0]).tolist() == [0.0, 0.25, 0.75, 1.0]
+
+
+def test_largest_rise_of_the_ocv_is_that_of_a_dense_search():
+    random = np.random.default_rng(3)
+    for _ in range(50):
+        soc = np.unique(np.concatenate([[0.0, 1.0], random.uniform(0.0, 1.0, 6)]))
+        ocv = OpenCircuitVoltage(
+            tuple(soc.tolist()),
+            tuple((3.0 + np.cumsum(random.exponential(0.1, len(soc)))).tolist()),
+        )
+        charge, (first, last) = random.uniform(0.0, 0.2), np.sort(random.uniform(0.0, 1.0, 2))
+        starts = np.linspace(first, last, 100_001)
+
+        found_V = float(ocv.largest_rise_V(charge, first, last))
+
+        searched_V = np.max(ocv(starts + charge) - ocv(starts))
+        assert found_V >= searched_V - 1e-12
+        assert found_V == pytest.approx(searched_V, abs=1e-3)
+
+
+def test_the_ocv_does_not_rise_where_there_is_no_start():
+    ocv = OpenCircuitVoltage((0.0, 0.5, 1.0), (2.0, 3.0, 3.5))
+    assert ocv.largest_rise_V([0.1, 0.1], [0.6, 0.4], [0.5, 0.6]).tolist() == [
+        0.0,
+        pytest.approx(0.2),
+    ]
 
 
 @pytest.mark.parametrize(

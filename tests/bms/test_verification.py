@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -14,7 +15,9 @@ from scipy.integrate import quad, solve_ivp
 from typer import Typer
 from typer.testing import CliRunner
 
-from bms.barrier.rounding import rounding_allowances
+from bms.barrier.margins import decision_allowances
+from bms.barrier.readings import BUS, reading_errors
+from bms.barrier.rounding import ARITHMETIC_ROUNDINGS
 from bms.cell import CellState, Disturbance, integrate_step, rates
 from bms.commands.verify import verify as command
 from bms.firmware import Firmware
@@ -26,7 +29,6 @@ from bms.verification.conditions import (
     chains,
     decided_conditions,
     firmware_constants,
-    reading_errors,
     required_conditions,
 )
 from bms.verification.decision import decide
@@ -35,6 +37,7 @@ from bms.verification.fallback import infeasible_part, thermal_response
 from bms.verification.intervals import Interval
 from bms.verification.search import CounterExample
 from bms.verification.thermal import Case, certify, held_integral
+from bms.verification.verify import thermal_cases
 
 NAMES = preset_names()
 TIME_LIMIT_S = 60.0
@@ -139,7 +142,7 @@ def test_a_quarter_of_a_margin_is_not_certified(name, margin):
         condition,
         decided_conditions(constants)[index],
         decay_per_s,
-        rounding_allowances(preset.cell, preset)[index],
+        decision_allowances(preset.cell, preset, BUS, ARITHMETIC_ROUNDINGS)[index + 2],
     )
 
     certificate = certify(
@@ -148,6 +151,15 @@ def test_a_quarter_of_a_margin_is_not_certified(name, margin):
 
     assert not certificate.holds
     assert certificate.open_low is not None
+
+
+def test_a_condition_that_is_no_number_is_not_certified():
+    preset, model = load_pair("lin2014", None)
+    (domain, case), *_ = thermal_cases(preset, firmware_constants(preset, model))
+
+    certificate = certify(domain, replace(case, allowance=np.nan), reading_errors(preset), 1_000)
+
+    assert not certificate.holds
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -203,7 +215,7 @@ def test_the_decision_that_is_reasoned_about_is_the_firmwares(name):
             surface_K,
             surface_K - random.uniform(-1.0, 20.0),
         )
-        lower_A, upper_A, active = decide(preset, constants, reading, 0.5, -23.0)
+        lower_A, upper_A, active = decide(constants, reading, 0.5, -23.0)
         decision = firmware.solve(
             soc=reading.soc,
             core_temperature_K=reading.core_temperature_K,
@@ -334,7 +346,13 @@ def test_command_prints_the_certificate_as_json():
 
 
 def test_command_fails_for_the_printed_formulas():
-    result = run_command("--preset", "lin2014", "--formulas", "paper")
+    result = run_command("--preset", "lin2014", "--formulas", "paper", "--boxes", "2000")
 
+    words = " ".join(result.stdout.split())
     assert result.return_value == 1
-    assert "NOT certified" in result.stdout
+    assert "NOT certified" in words
+    assert "voltage: NOT certified: voltage_margin_V 0 is 0.0142 less than" in words
+    assert "(at counted_soc 0.99, current_A -14.0356, soc_at_end 0.992026)" in words
+    assert "take --formulas corrected; these formulas contain a9-resistance" in words
+    (boxes,) = set(re.findall(r"undecided after (\d+) boxes", words))
+    assert 2000 <= int(boxes) < 10_000

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -71,8 +72,18 @@ def test_what_is_not_a_number_is_sent_as_all_ones(name: str) -> None:
 def test_rounding_towards_zero_never_asks_for_more_current(value: float) -> None:
     raw = lib.codec_encode(in_c("CommandCurrent"), value, lib.CODEC_TOWARDS_ZERO)
     sent = -65 + raw * 0.002
-    assert abs(sent) <= abs(value) + 0.02 * 0.002 + 1e-5
+    assert abs(sent) <= abs(value) + BusQuantisation().command_A
     assert abs(sent - value) < 0.002 + 1e-5
+
+
+def test_a_command_just_short_of_a_step_gains_less_than_margins_assume() -> None:
+    signal, gained_A = in_c("CommandCurrent"), []
+    for step_A in -0.002 * np.arange(0, 32_501, 17):
+        for missing_A in np.arange(3.6e-5, 6e-5, 2e-6):
+            value = float(np.float32(step_A + missing_A))
+            raw = lib.codec_encode(signal, value, lib.CODEC_TOWARDS_ZERO)
+            gained_A.append(abs(-65 + raw * 0.002) - abs(value))
+    assert 0.8 * BusQuantisation().command_A < max(gained_A) <= BusQuantisation().command_A
 
 
 @pytest.mark.parametrize("value", [0.0, -23.0, -22.998, -0.002, -11.5])
@@ -88,6 +99,7 @@ def test_margins_assume_the_resolution_of_the_database() -> None:
         "surface_temperature_K": "SurfaceTemperature",
         "coolant_temperature_K": "CoolantTemperature",
         "cooling_power_W": "CoolingPower",
+        "plug_in_soc": "PlugInStateOfCharge",
     }.items():
         assert getattr(half_steps, field) == pytest.approx(SIGNALS[name].scale / 2)
 

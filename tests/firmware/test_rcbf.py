@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy import sparse
 from scipy.optimize import brentq, minimize
 
-from bms.barrier.rounding import rounding_allowances
+from bms.barrier.rounding import CONSTANT_ROUNDINGS, UNIT, rounding_allowances
 from bms.decision import Decision
 from bms.firmware import Firmware
 from tests.firmware.constraints import NAMES, interval, quadratics, value
@@ -176,9 +176,7 @@ def tight_states(firmware: Firmware, name: str, count: int) -> Iterator[dict[str
 
 @pytest.mark.parametrize("name", ["core", "surface"])
 def test_float32_never_takes_more_than_its_allowance(firmware: Firmware, name: str) -> None:
-    allowances = dict(
-        zip(("core", "surface"), rounding_allowances(firmware.preset.cell, firmware.preset))
-    )
+    allowances = rounding_allowances(firmware.preset.cell, firmware.preset)
     decided = 0
     for state in tight_states(firmware, name, 1_500):
         decision = solve(firmware, state)
@@ -186,12 +184,43 @@ def test_float32_never_takes_more_than_its_allowance(firmware: Firmware, name: s
             continue
         decided += decision.active_constraint == name
         groups = quadratics(firmware.parameters, state)
-        for other, allowance in allowances.items():
-            sides = groups[NAMES.index(other)]
+        for other in ("core", "surface"):
+            sides, allowance = groups[NAMES.index(other)], allowances[NAMES.index(other)]
             assert min(value(q, decision.current_A) for q in sides) >= -allowance, state
     assert decided > 50
 
 
+@pytest.mark.parametrize("name", ["voltage", "soc"])
+def test_float32_never_takes_more_than_its_electrical_allowance(
+    firmware: Firmware, name: str
+) -> None:
+    preset = firmware.preset
+    group, ocv = NAMES.index(name), preset.cell.ocv
+    allowance = rounding_allowances(preset.cell, preset)[group]
+    if name == "voltage":
+        # The counting error of the margin has room for the rounding of the table's own points.
+        steepest_V = np.max(np.diff(ocv.voltage_V) / np.diff(ocv.soc))
+        allowance += CONSTANT_ROUNDINGS * UNIT * steepest_V
+    random = np.random.default_rng(6)
+    decided = 0
+    for soc in random.uniform(0.8, preset.limits.max_soc, 3_000).astype(np.float32):
+        state = {**COLD, "soc": float(soc)}
+        decision = solve(firmware, state)
+        if decision.active_constraint != name:
+            continue
+        decided += 1
+        (side,) = quadratics(firmware.parameters, state)[group]
+        assert abs(value(side, decision.current_A)) <= allowance, state
+    assert decided > 300
+
+
+COLD = {
+    "core_temperature_K": 290.0,
+    "surface_temperature_K": 290.0,
+    "coolant_temperature_K": 290.0,
+    "cooling_power_W": 0.5,
+    "reference_current_A": -23.0,
+}
 BAD = st.sampled_from([math.nan, math.inf, -math.inf, 1e30, -1e30])
 GOOD = {
     "soc": 0.5,

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from bms.barrier.rounding import ROUNDINGS, UNIT
 from bms.firmware._firmware import ffi, lib
 
 CAPACITY_AS, PERIOD_S = 8280.0, np.float32(0.1)
@@ -47,3 +48,18 @@ def test_currents_that_agree_in_the_long_run_count_once() -> None:
     assert counted(0.1, swinging, late) == pytest.approx(
         counted(0.1, swinging), abs=1.001 * one_period
     )
+
+
+def test_float32_counts_within_its_share_of_the_error_bound() -> None:
+    """Capacity, period, currents and plug-in value rounded to float32; charges up to full."""
+    random = np.random.default_rng(1)
+    for _ in range(20):
+        capacity_As, period_s = random.uniform(2e3, 2e5), random.uniform(0.01, 1.0)
+        start, steps = random.uniform(0.0, 0.5), 2000
+        currents_A = random.uniform(-1.0, 0.2, steps)
+        currents_A *= (1.0 - start) * capacity_As / (period_s * -np.sum(currents_A))
+        state = ffi.new("soc_t *")
+        lib.soc_set(state, start)
+        for current_A in currents_A:
+            lib.soc_count(state, current_A, current_A, period_s, capacity_As)
+        assert float(state.soc) == pytest.approx(1.0, abs=ROUNDINGS * UNIT)
