@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
@@ -11,10 +12,12 @@ from cantools.database.can.c_source import camel_to_snake_case, generate
 from codegen.can_database import (
     CYCLE_ATTRIBUTE,
     ECU,
+    OPTIONAL_ATTRIBUTE,
     PLANT,
     data_ids,
     database_digest,
     load_database,
+    network_version,
     number_attribute,
 )
 from codegen.rendering import environment, float_literal
@@ -55,6 +58,7 @@ def _catalogue(database: Database) -> dict[str, Any]:
 
     signals = [s for m in database.messages for s in m.signals if s.unit]
     return {
+        "network_version": network_version(database),
         "digest": database_digest(),
         "received": messages(PLANT),
         "transmitted": messages(ECU),
@@ -74,6 +78,7 @@ def _message(database: Database, message: Message) -> dict[str, Any]:
         "id": message.frame_id,
         "length": message.length,
         "is_protected": int(bool(literals)),
+        "is_optional": number(OPTIONAL_ATTRIBUTE),
         "every_periods": number(CYCLE_ATTRIBUTE) // period_ms,
         "max_delta_counter": number("E2EMaxDeltaCounter"),
         "window_periods": number("E2EWindowSize"),
@@ -86,10 +91,13 @@ def _message(database: Database, message: Message) -> dict[str, Any]:
 
 
 def _signal(signal: Signal) -> dict[str, Any]:
+    offset_steps = round(signal.offset / signal.scale)
+    # A whole number of steps keeps the zero exact and the rounding relative to the value.
+    assert math.isclose(offset_steps * signal.scale, signal.offset, abs_tol=1e-9 * signal.scale)
     return {
         "name": camel_to_snake_case(signal.name).upper(),
         "unit": signal.unit,
         "scale": float_literal(float(signal.scale)),
-        "offset": float_literal(float(signal.offset)),
+        "offset_steps": offset_steps,
         "raw_max": 2**signal.length - 1 - RESERVED_CODES,
     }

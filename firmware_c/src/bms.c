@@ -11,7 +11,7 @@
 
 typedef char transmitted_messages_agree[(BMS_TRANSMITTED_MESSAGES == CAN_TRANSMITTED_COUNT) ? 1
                                                                                            : -1];
-typedef char faults_fit_into_their_signal[(FAULT_COUNT <= 20) ? 1 : -1];
+typedef char faults_fit_into_their_mask[(FAULT_COUNT <= 32) ? 1 : -1];
 
 static const rcbf_decision_t NO_DECISION = {
     0.0f, false, RCBF_INVALID, NAN, NAN, { NAN, NAN, NAN, NAN }
@@ -64,9 +64,17 @@ static uint32_t symptoms_of_missing_messages(const bms_t *bms)
     };
     uint32_t symptoms = bit_if(bms->network.is_disturbed, FAULT_CORRUPTED_FRAMES);
     for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
-        symptoms |= bit_if(!is_usable(bms, i), MISSING[i]);
+        symptoms |= bit_if(!CAN_RECEIVED[i].is_optional && !is_usable(bms, i), MISSING[i]);
     }
     return symptoms;
+}
+
+/* There is nothing yet that could hold a time: who asks for one must not believe it kept. */
+static bool mode_is_known(const bms_t *bms)
+{
+    const uint8_t mode = bms->measurement.mode;
+    return !is_usable(bms, CAN_RECEIVED_CHARGE_MODE) || (mode == MODE_FASTEST) ||
+           (mode == MODE_FIXED);
 }
 
 static bool request_is_valid(const bms_t *bms)
@@ -75,7 +83,8 @@ static bool request_is_valid(const bms_t *bms)
     const bool start_is_known =
         (m->plug_in_soc >= 0.0f) && (m->plug_in_soc <= bms->calibration->rcbf.max_soc);
     return (m->request == REQUEST_OFF) ||
-           ((m->request == REQUEST_CHARGE) && (m->reference_current_A <= 0.0f) && start_is_known);
+           ((m->request == REQUEST_CHARGE) && (m->reference_current_A <= 0.0f) && start_is_known &&
+            mode_is_known(bms));
 }
 
 static uint32_t symptoms_of_readings(const bms_t *bms)
@@ -270,6 +279,8 @@ static void queue_frames(bms_t *bms)
     const uint32_t turn =
         bms->periods / CAN_TRANSMITTED[CAN_TRANSMITTED_NETWORK_DIAGNOSTICS].every_periods;
     const uint8_t reported = (uint8_t)(turn % CAN_RECEIVED_COUNT);
+    const uint32_t page_turn =
+        bms->periods / CAN_TRANSMITTED[CAN_TRANSMITTED_DIAGNOSTICS2].every_periods;
     const codec_report_t report = {
         .command_A = bms->command_A,
         .state = (uint8_t)bms->state,
@@ -288,6 +299,7 @@ static void queue_frames(bms_t *bms)
         .first_fault = bms->monitor.first,
         .active_faults = bms->monitor.active,
         .latched_faults = bms->monitor.latched,
+        .fault_page = (uint8_t)(page_turn % 2u),
         .reported_message = reported,
         .reported_state = (uint8_t)bms->network.receivers[reported].state,
         .reported_counts = bms->network.receivers[reported].counts,
@@ -300,7 +312,8 @@ static void queue_frames(bms_t *bms)
     bms->outbox_length = 0u;
     bms->outbox_next = 0u;
     for (uint32_t i = 0u; i < CAN_TRANSMITTED_COUNT; i++) {
-        if (bms->periods % CAN_TRANSMITTED[i].every_periods != 0u) {
+        const uint32_t every_periods = CAN_TRANSMITTED[i].every_periods;
+        if ((every_periods == 0u) || (bms->periods % every_periods != 0u)) {
             continue;
         }
         can_frame_t *frame = &bms->outbox[bms->outbox_length];
