@@ -12,6 +12,7 @@ CYCLE_ATTRIBUTE = "GenMsgCycleTime"
 TIMEOUT_ATTRIBUTE = "MessageTimeoutTime"
 DATA_IDS_ATTRIBUTE = "E2EProfile2DataIdList"
 OPTIONAL_ATTRIBUTE = "MessageIsOptional"
+BOOT_STAGE_ATTRIBUTE = "MessageIsFromBootStage"
 ECU, PLANT = "ECU", "PLANT"
 
 

@@ -10,6 +10,7 @@ from cantools.database.can import Database, Message, Signal
 from cantools.database.can.c_source import camel_to_snake_case, generate
 
 from codegen.can_database import (
+    BOOT_STAGE_ATTRIBUTE,
     CYCLE_ATTRIBUTE,
     ECU,
     OPTIONAL_ATTRIBUTE,
@@ -79,7 +80,9 @@ def _message(database: Database, message: Message) -> dict[str, Any]:
         "length": message.length,
         "is_protected": int(bool(literals)),
         "is_optional": number(OPTIONAL_ATTRIBUTE),
-        "every_periods": number(CYCLE_ATTRIBUTE) // period_ms,
+        "every_periods": 0
+        if number(BOOT_STAGE_ATTRIBUTE)
+        else number(CYCLE_ATTRIBUTE) // period_ms,
         "max_delta_counter": number("E2EMaxDeltaCounter"),
         "window_periods": number("E2EWindowSize"),
         "limits": [

@@ -110,6 +110,7 @@ extern "C" {
 #define CAN_DB_IDENTITY_CYCLE_TIME_MS (1000u)
 #define CAN_DB_NETWORK_DIAGNOSTICS_CYCLE_TIME_MS (500u)
 #define CAN_DB_DIAGNOSTICS2_CYCLE_TIME_MS (500u)
+#define CAN_DB_BOOT_REFUSAL_CYCLE_TIME_MS (100u)
 
 /* Signal choices. */
 #define CAN_DB_CHARGE_REQUEST_REQUEST_OFF_CHOICE (0u)
@@ -442,7 +443,7 @@ struct can_db_charge_request_t {
 /**
  * Signals in message ChargeMode.
  *
- * How the charge shall be made; optional. Without it, and in mode Fastest, it is the fastest that reference current and constraints allow. A mode that the ECU does not have is an invalid request.
+ * How the charge is to be made; a charger that does not care leaves it out. Without it, and in mode Fastest, the charge is the fastest that the ECU has. Fixed follows the reference current. A mode that the ECU does not have is an invalid request, as ByTime is now.
  *
  * All signal values are as on the CAN bus.
  */
@@ -720,7 +721,7 @@ struct can_db_diagnostics_t {
 /**
  * Signals in message Identity.
  *
- * First bits of the model's and the preset's SHA-256, the version of the firmware (0: its boot stage), and that of this database; a log without it is of version 1.
+ * First bits of the model's and the preset's SHA-256, the version of the firmware (0: its boot stage), and that of this database, 0 in version 1.
  *
  * All signal values are as on the CAN bus.
  */
@@ -757,7 +758,7 @@ struct can_db_identity_t {
 /**
  * Signals in message NetworkDiagnostics.
  *
- * How one of the messages to the ECU fared since start-up; the four take turns. A count of 255 means 255 or more.
+ * How one of the messages to the ECU fared since start-up; all take turns. A count of 255 means 255 or more.
  *
  * All signal values are as on the CAN bus.
  */
@@ -835,7 +836,7 @@ struct can_db_network_diagnostics_t {
 /**
  * Signals in message Diagnostics2.
  *
- * Faults from 20 on: bit n is fault n + 20 of monitor.h. Active and latched ones take turns.
+ * The same as Diagnostics for later faults: bit n is fault n + 20 of monitor.h. Active and latched ones take turns.
  *
  * All signal values are as on the CAN bus.
  */

@@ -27,7 +27,7 @@ typedef struct {
     uint8_t length;
     uint8_t is_protected;
     uint8_t is_optional;
-    uint8_t every_periods; /* 0: not sent by the application */
+    uint8_t every_periods; /* 0: the application does not send it */
     e2e_policy_t policy;
     uint8_t data_ids[E2E_COUNTERS];
 } codec_message_t;

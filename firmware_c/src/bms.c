@@ -69,12 +69,14 @@ static uint32_t symptoms_of_missing_messages(const bms_t *bms)
     return symptoms;
 }
 
-/* There is nothing yet that could hold a time: who asks for one must not believe it kept. */
+/* Nothing here plans a charge by time, and who asks for one must not believe that it is kept. What
+ * the optional message said last counts for as long as it is valid, over lost frames too. */
 static bool mode_is_known(const bms_t *bms)
 {
+    const bool is_asked_for =
+        bms->network.receivers[CAN_RECEIVED_CHARGE_MODE].state == E2E_VALID;
     const uint8_t mode = bms->measurement.mode;
-    return !is_usable(bms, CAN_RECEIVED_CHARGE_MODE) || (mode == MODE_FASTEST) ||
-           (mode == MODE_FIXED);
+    return !is_asked_for || (mode == MODE_FASTEST) || (mode == MODE_FIXED);
 }
 
 static bool request_is_valid(const bms_t *bms)

@@ -8,6 +8,8 @@
 
 /* Share of a step by which float32 may miss a value that lies exactly on a step. */
 #define STEP_TOLERANCE 0.02f
+/* More than any signal has; float32 holds every whole number up to there. */
+#define MOST_STEPS 16777216.0f
 /* All ones of the fields that carry a code. */
 #define TWO_BITS 3u
 #define FOUR_BITS 15u
@@ -18,18 +20,21 @@ uint32_t codec_encode(const codec_signal_t *signal, float value, codec_rounding_
     if (!numeric_is_finite(value)) {
         return signal->raw_max + 2u;
     }
-    float up = 0.5f;
-    if (rounding == CODEC_TOWARDS_ZERO) {
-        up = (value < 0.0f) ? (1.0f - STEP_TOLERANCE) : STEP_TOLERANCE;
+    const float up = (rounding == CODEC_TOWARDS_ZERO) ? STEP_TOLERANCE : 0.5f;
+    /* Rounded before the offset comes on top, in which float32 would lose parts of a step. */
+    const int32_t steps =
+        (int32_t)numeric_clamp(numeric_abs(value) / signal->scale + up, 0.0f, MOST_STEPS);
+    const int32_t raw = ((value < 0.0f) ? -steps : steps) - signal->offset_steps;
+    if (raw < 0) {
+        return 0u;
     }
-    const float steps = value / signal->scale - (float)signal->offset_steps + up;
-    return (uint32_t)numeric_clamp(steps, 0.0f, (float)signal->raw_max);
+    return ((uint32_t)raw < signal->raw_max) ? (uint32_t)raw : signal->raw_max;
 }
 
 float codec_decode(const codec_signal_t *signal, uint32_t raw)
 {
-    return (raw > signal->raw_max) ? NAN
-                                   : (signal->scale * (float)((int32_t)raw + signal->offset_steps));
+    const float steps = (float)((int32_t)raw + signal->offset_steps);
+    return (raw > signal->raw_max) ? NAN : (signal->scale * steps);
 }
 
 static float decode(uint32_t signal, uint32_t raw)

@@ -7,13 +7,18 @@
 
 static double raw_of(const link_signal_t *signal, double value)
 {
-    const double steps = (value - signal->offset) / signal->scale;
+    const double steps = value / signal->scale - signal->offset_steps;
     return rint(fmin(fmax(steps, signal->lowest), signal->highest));
+}
+
+static double value_of(const link_signal_t *signal, double raw)
+{
+    return (raw + signal->offset_steps) * signal->scale;
 }
 
 double link_over_the_bus(const link_signal_t *signal, double value)
 {
-    return raw_of(signal, value) * signal->scale + signal->offset;
+    return value_of(signal, raw_of(signal, value));
 }
 
 static void send(link_t *link, uint32_t index, can_frame_t *frame)
@@ -61,7 +66,7 @@ static link_answer_t hear(link_t *link, const link_signals_t *signals)
         (void)can_db_charge_command_unpack(&command, frame.data, frame.length);
         const link_signal_t *signal = &signals->command_current;
         answer.intact = (double)command.command_current <= signal->highest;
-        answer.command_A = command.command_current * signal->scale + signal->offset;
+        answer.command_A = value_of(signal, command.command_current);
         answer.state = command.command_state;
     }
     return answer;
