@@ -17,21 +17,12 @@ import numpy as np
 from bms.barrier.constants import barrier_constants
 from bms.barrier.rates import Weights, largest_rate
 from bms.barrier.rounding import rounding_allowances
+from bms.bus_signals import QUANTISATION, BusQuantisation
 from bms.cell import CellParameters
 from bms.presets.schema import Preset
 
 COUNTING_HORIZON_S = 3600.0
 """Longest charge over which coulomb counting has to stay within its error bound."""
-
-
-@dataclass(frozen=True)
-class BusQuantisation:
-    """Half a step of each measured signal on the bus; equal to the CAN database by a test."""
-
-    current_A: float = 0.001
-    surface_temperature_K: float = 0.0025
-    coolant_temperature_K: float = 0.0025
-    cooling_power_W: float = 0.0005
 
 
 @dataclass(frozen=True)
@@ -59,7 +50,7 @@ def soc_error_bound(cell: CellParameters, preset: Preset, bus: BusQuantisation) 
 
 
 def sampling_margins(
-    cell: CellParameters, preset: Preset, bus: BusQuantisation = BusQuantisation()
+    cell: CellParameters, preset: Preset, bus: BusQuantisation = QUANTISATION
 ) -> Margins:
     """Margins for a cell with the timing, sensors and limits of a preset (V, 1/s, K/s, K/s^2)."""
     constants = barrier_constants(cell, preset)

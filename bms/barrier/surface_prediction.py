@@ -14,12 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bms.arrays import Array
-from bms.barrier.margins import BusQuantisation
+from bms.bus_signals import QUANTISATION, BusQuantisation
 from bms.cell import CellParameters
 from bms.errors import InputError
 from bms.presets.schema import Preset
-
-_BUS = BusQuantisation()
 
 
 @dataclass(frozen=True)
@@ -37,7 +35,7 @@ class SurfacePrediction:
 
 
 def surface_prediction(
-    cell: CellParameters, preset: Preset, bus: BusQuantisation = _BUS
+    cell: CellParameters, preset: Preset, bus: BusQuantisation = QUANTISATION
 ) -> SurfacePrediction:
     """Exact discretisation for the preset's period, inputs held, of the cell's two-mass model.
 

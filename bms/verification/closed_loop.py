@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from bms.barrier import BusQuantisation
 from bms.barrier.margins import soc_error_bound
+from bms.bus_signals import BusQuantisation
 from bms.cell import CellState, Disturbance, integrate_step, terminal_voltage_V
 from bms.model.model_file import KanModel
 from bms.presets import Preset

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from bms.barrier import BusQuantisation, barrier_constants
+from bms.barrier import barrier_constants
 from bms.barrier.machinery import check_gains
+from bms.bus_signals import BusQuantisation
 from bms.firmware.calibration import calibration_block
 from bms.model.model_file import KanModel
 from bms.presets import Preset

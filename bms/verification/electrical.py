@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from bms.barrier import BusQuantisation
 from bms.barrier.margins import soc_error_bound
+from bms.bus_signals import BusQuantisation
 from bms.presets import Preset
 from bms.verification.certificate import Certificate
 

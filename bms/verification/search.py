@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from bms.arrays import Array
-from bms.barrier import BusQuantisation
 from bms.barrier.margins import soc_error_bound
+from bms.bus_signals import BusQuantisation
 from bms.cell import CellState, Disturbance, integrate_step, terminal_voltage_V
 from bms.verification.barriers import Barrier
 from bms.verification.conditions import Condition, ReadingErrors, decided_conditions

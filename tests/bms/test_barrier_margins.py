@@ -11,9 +11,10 @@ import pytest
 
 from bms.barrier import Margins, barrier_constants, sampling_margins
 from bms.barrier.constraints import charging_current_A, left_hand_sides
-from bms.barrier.margins import BusQuantisation, soc_error_bound
+from bms.barrier.margins import soc_error_bound
 from bms.barrier.rates import Weights, heat_range_W, largest_rate
 from bms.barrier.rounding import rounding_allowances
+from bms.bus_signals import BusQuantisation
 from bms.cell import CellState, Disturbance, integrate_step, rates, terminal_voltage_V
 from bms.presets import load_preset, preset_names
 from bms.presets.schema import Uncertainty

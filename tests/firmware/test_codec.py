@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bms.barrier import BusQuantisation
+from bms.bus_signals import BusQuantisation
 from bms.firmware._firmware import ffi, lib
 from codegen.can_database import load_database
 from codegen.can_sources import can_sources
