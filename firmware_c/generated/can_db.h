@@ -443,7 +443,7 @@ struct can_db_charge_request_t {
 /**
  * Signals in message ChargeMode.
  *
- * How the charge is to be made; a charger that does not care leaves it out. Without it, and in mode Fastest, the charge is the fastest that the ECU has. Fixed follows the reference current. A mode that the ECU does not have is an invalid request, as ByTime is now.
+ * How the charge is to be made; a charger that does not care leaves it out. What came last holds as long as the message is valid. Without it, and in mode Fastest, the charge is the fastest that the ECU has. Fixed follows the reference current. A mode that the ECU does not have is an invalid request, as ByTime is now.
  *
  * All signal values are as on the CAN bus.
  */

@@ -24,7 +24,7 @@ POLICY = {
 }
 
 
-def frame(counter: int, length: int = 4) -> bytes:
+def frame(counter: int, length: int = COMMAND.length) -> bytes:
     plain = bytes([0, counter % 16] + [7] * (length - 2))
     return bytes(cantools.autosar.apply_profile2_crc(plain, data_ids(COMMAND)[counter % 16]))
 
