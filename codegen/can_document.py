@@ -93,6 +93,7 @@ def _example(database: Database) -> dict[str, str]:
     values |= {f"{_EXAMPLE}Counter": counter, "CommandState": 1}
     data = message.encode(values, strict=False)
     whole = autosar.apply_profile2_crc(data, data_ids(message)[counter])
+    assert whole is not None
     return {
         "name": _EXAMPLE,
         "counter": str(counter),

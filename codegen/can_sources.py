@@ -51,8 +51,14 @@ def _without_date(text: str) -> str:
 
 
 def _catalogue(database: Database) -> dict[str, Any]:
-    def messages(sender: str) -> list[dict[str, Any]]:
-        found = [m for m in database.messages if m.senders == [sender] and m.length > 0]
+    def messages(sender: str, is_from_boot_stage: bool = False) -> list[dict[str, Any]]:
+        found = [
+            m
+            for m in database.messages
+            if m.senders == [sender]
+            and m.length > 0
+            and bool(number_attribute(database, m, BOOT_STAGE_ATTRIBUTE)) == is_from_boot_stage
+        ]
         # The charge command ends a period for whoever waits for it.
         found.sort(key=lambda m: (m.name == "ChargeCommand", m.frame_id))
         return [_message(database, m) for m in found]
@@ -63,6 +69,7 @@ def _catalogue(database: Database) -> dict[str, Any]:
         "digest": database_digest(),
         "received": messages(PLANT),
         "transmitted": messages(ECU),
+        "boot_stage": messages(ECU, is_from_boot_stage=True),
         "signals": [_signal(s) for s in signals],
     }
 
@@ -80,9 +87,7 @@ def _message(database: Database, message: Message) -> dict[str, Any]:
         "length": message.length,
         "is_protected": int(bool(literals)),
         "is_optional": number(OPTIONAL_ATTRIBUTE),
-        "every_periods": 0
-        if number(BOOT_STAGE_ATTRIBUTE)
-        else number(CYCLE_ATTRIBUTE) // period_ms,
+        "every_periods": number(CYCLE_ATTRIBUTE) // period_ms,
         "max_delta_counter": number("E2EMaxDeltaCounter"),
         "window_periods": number("E2EWindowSize"),
         "limits": [

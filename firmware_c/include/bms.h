@@ -25,7 +25,7 @@ extern "C" {
 #endif
 
 #define BMS_FIRMWARE_VERSION 3
-#define BMS_TRANSMITTED_MESSAGES 9
+#define BMS_TRANSMITTED_MESSAGES 8
 
 typedef enum {
     BMS_INIT = 0,

@@ -27,7 +27,7 @@ typedef struct {
     uint8_t length;
     uint8_t is_protected;
     uint8_t is_optional;
-    uint8_t every_periods; /* 0: the application does not send it */
+    uint8_t every_periods;
     e2e_policy_t policy;
     uint8_t data_ids[E2E_COUNTERS];
 } codec_message_t;
@@ -83,8 +83,6 @@ typedef struct {
     uint32_t model_hash;
     uint16_t preset_hash;
     uint8_t firmware_version;
-    uint8_t refused_part; /* refusal_part_t */
-    uint8_t failed_check; /* image_status_t */
 } codec_report_t;
 
 /* Reads received message `index` (order of CAN_RECEIVED); the length must have been checked. */

@@ -314,8 +314,7 @@ static void queue_frames(bms_t *bms)
     bms->outbox_length = 0u;
     bms->outbox_next = 0u;
     for (uint32_t i = 0u; i < CAN_TRANSMITTED_COUNT; i++) {
-        const uint32_t every_periods = CAN_TRANSMITTED[i].every_periods;
-        if ((every_periods == 0u) || (bms->periods % every_periods != 0u)) {
+        if (bms->periods % CAN_TRANSMITTED[i].every_periods != 0u) {
             continue;
         }
         can_frame_t *frame = &bms->outbox[bms->outbox_length];

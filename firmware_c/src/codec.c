@@ -185,15 +185,6 @@ static void write_identity(const codec_report_t *report, uint8_t *data)
     (void)can_db_identity_pack(data, &message, CAN_DB_IDENTITY_LENGTH);
 }
 
-static void write_refusal(const codec_report_t *report, uint8_t *data)
-{
-    const struct can_db_boot_refusal_t message = {
-        .refused_part = code(report->refused_part, FOUR_BITS),
-        .failed_check = report->failed_check,
-    };
-    (void)can_db_boot_refusal_pack(data, &message, CAN_DB_BOOT_REFUSAL_LENGTH);
-}
-
 static void write_command(const codec_report_t *report, uint8_t *data)
 {
     const struct can_db_charge_command_t message = {
@@ -214,7 +205,6 @@ void codec_write(uint32_t index, const codec_report_t *report, can_frame_t *fram
         [CAN_TRANSMITTED_NETWORK_DIAGNOSTICS] = write_network_diagnostics,
         [CAN_TRANSMITTED_DIAGNOSTICS2] = write_more_diagnostics,
         [CAN_TRANSMITTED_IDENTITY] = write_identity,
-        [CAN_TRANSMITTED_BOOT_REFUSAL] = write_refusal,
         [CAN_TRANSMITTED_CHARGE_COMMAND] = write_command,
     };
     frame->id = CAN_TRANSMITTED[index].id;

@@ -11,6 +11,7 @@ from statistics import median
 from typing import Any
 
 import pytest
+from cantools.database.can.c_source import camel_to_snake_case
 
 from bms.firmware._firmware import lib
 from codegen import can_database
@@ -72,12 +73,13 @@ def heard(
 
 def refusal(frames: list[Frame]) -> tuple[str, str] | None:
     """Part and check that the frames name; None when nothing is said."""
-    names = {getattr(lib, name): name.removeprefix("IMAGE_") for name in STATUSES}
+    names = CODECS["BootRefusal"].choices
     for frame in frames:
         if frame.frame_id == CODECS["BootRefusal"].frame_id:
             values = CODECS["BootRefusal"].decode(frame.data)
-            part = CODECS["BootRefusal"].choices["RefusedPart"][int(values["RefusedPart"])]
-            return part.upper().removesuffix("STAGE"), names[int(values["FailedCheck"])]
+            part = names["RefusedPart"][int(values["RefusedPart"])]
+            check = camel_to_snake_case(names["FailedCheck"][int(values["FailedCheck"])])
+            return part.upper().removesuffix("STAGE"), check.upper()
     return None
 
 
@@ -139,7 +141,7 @@ def test_a_refusal_is_told_by_frames_that_the_charger_trusts(
         ("if (message->is_protected)", "if (period == 0u)"),
         (".failed_check = (uint8_t)status,", ""),
         (".refused_part = (uint8_t)part,", ""),
-        ("CAN_TRANSMITTED_BOOT_REFUSAL,", "CAN_TRANSMITTED_ESTIMATE,"),
+        ("write_refusal(part, status, &frames[2]);", ""),
     ],
     ids=lambda change: change[0],
 )

@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 
 import pytest
-from bms.firmware._firmware import lib
 
+from bms.firmware._firmware import lib
 from codegen.can_database import network_version
 from tests.firmware.bench import DATABASE, READY_PERIODS, RECEIVED, STATES, Bench
 

@@ -236,6 +236,8 @@ def test_names_of_faults_states_and_messages_in_the_database_are_the_firmware_s(
     assert names("ChargeRequest", "Request") == {**requests, 15: "NotAvailable"}
     pages = spelled("FAULT_PAGE_", ffi.typeof("codec_fault_page_t").elements)
     assert names("Diagnostics2", "FaultPage") == pages
+    checks = spelled("IMAGE_", ffi.typeof("image_status_t").elements)
+    assert {**names("BootRefusal", "FailedCheck"), lib.IMAGE_OK: "Ok"} == checks
     constraints = spelled("RCBF_", ffi.typeof("rcbf_active_t").elements)
     assert names("Decision", "ActiveConstraint") == constraints
     assert names("NetworkDiagnostics", "ReportedMessage") == dict(enumerate(RECEIVED))

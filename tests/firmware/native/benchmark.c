@@ -59,16 +59,10 @@ static void decide(bench_t *bench, uint32_t period)
     bench->sink = rcbf_solve(&BMS_DEFAULT_CALIBRATION.rcbf, &bench->input).current_A;
 }
 
-static bool is_sent(uint32_t message, uint32_t period)
-{
-    const uint32_t every_periods = CAN_TRANSMITTED[message].every_periods;
-    return (every_periods != 0u) && (period % every_periods == 0u);
-}
-
 static void encode(bench_t *bench, uint32_t period)
 {
     for (uint32_t i = 0u; i < CAN_TRANSMITTED_COUNT; i++) {
-        if (is_sent(i, period)) {
+        if (period % CAN_TRANSMITTED[i].every_periods == 0u) {
             codec_write(i, &bench->report, &bench->sent);
             bench->sink = (float)bench->sent.data[7];
         }
@@ -78,7 +72,7 @@ static void encode(bench_t *bench, uint32_t period)
 static void protect(bench_t *bench, uint32_t period)
 {
     for (uint32_t i = 0u; i < CAN_TRANSMITTED_COUNT; i++) {
-        if (CAN_TRANSMITTED[i].is_protected && is_sent(i, period)) {
+        if (CAN_TRANSMITTED[i].is_protected && (period % CAN_TRANSMITTED[i].every_periods == 0u)) {
             e2e_protect(bench->sent.data, CAN_TRANSMITTED[i].length, CAN_TRANSMITTED[i].data_ids,
                         (uint8_t)period);
             bench->sink = (float)bench->sent.data[0];
