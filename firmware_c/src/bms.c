@@ -5,6 +5,7 @@
 
 #include "can_catalog.h"
 #include "numeric.h"
+#include "request.h"
 
 /* Periods that the other nodes have to come up before their silence is a fault. */
 #define START_UP_PERIODS 50u
@@ -35,6 +36,12 @@ static bool is_charging(const bms_t *bms)
 static bool is_usable(const bms_t *bms, uint32_t message)
 {
     return bms->network.is_usable[message];
+}
+
+/* What a message said last still counts, though no frame came in this period. */
+static bool is_valid(const bms_t *bms, uint32_t message)
+{
+    return bms->network.receivers[message].state == E2E_VALID;
 }
 
 void bms_init(bms_t *bms, const bms_config_t *config)
@@ -69,26 +76,6 @@ static uint32_t symptoms_of_missing_messages(const bms_t *bms)
     return symptoms;
 }
 
-/* Nothing here plans a charge by time, and who asks for one must not believe that it is kept. What
- * the optional message said last counts for as long as it is valid, over lost frames too. */
-static bool mode_is_known(const bms_t *bms)
-{
-    const bool is_asked_for =
-        bms->network.receivers[CAN_RECEIVED_CHARGE_MODE].state == E2E_VALID;
-    const uint8_t mode = bms->measurement.mode;
-    return !is_asked_for || (mode == MODE_FASTEST) || (mode == MODE_FIXED);
-}
-
-static bool request_is_valid(const bms_t *bms)
-{
-    const codec_measurement_t *m = &bms->measurement;
-    const bool start_is_known =
-        (m->plug_in_soc >= 0.0f) && (m->plug_in_soc <= bms->calibration->rcbf.max_soc);
-    return (m->request == REQUEST_OFF) ||
-           ((m->request == REQUEST_CHARGE) && (m->reference_current_A <= 0.0f) && start_is_known &&
-            mode_is_known(bms));
-}
-
 static uint32_t symptoms_of_readings(const bms_t *bms)
 {
     const codec_measurement_t *m = &bms->measurement;
@@ -117,7 +104,9 @@ static uint32_t symptoms_of_readings(const bms_t *bms)
                   FAULT_COOLANT_RANGE) |
            bit_if(coolant && is_outside(m->cooling_power_W, &limits->cooling_power_W),
                   FAULT_COOLING_RANGE) |
-           bit_if(is_usable(bms, CAN_RECEIVED_CHARGE_REQUEST) && !request_is_valid(bms),
+           bit_if(is_usable(bms, CAN_RECEIVED_CHARGE_REQUEST) &&
+                      !request_is_valid(m, is_valid(bms, CAN_RECEIVED_CHARGE_MODE),
+                                        cell->max_soc),
                   FAULT_REQUEST_INVALID) |
            bit_if(electrical && thermal && coolant && !bms->estimate.in_domain,
                   FAULT_OUT_OF_DOMAIN) |

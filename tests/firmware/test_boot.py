@@ -138,7 +138,7 @@ def test_a_refusal_is_told_by_frames_that_the_charger_trusts(
         (".active_faults = faults,", ""),
         (".latched_faults = faults,", ""),
         ("(uint8_t)period", "0u"),
-        ("if (message->is_protected)", "if (period == 0u)"),
+        ("if (MESSAGES[i]->is_protected)", "if (period == 0u)"),
         (".failed_check = (uint8_t)status,", ""),
         (".refused_part = (uint8_t)part,", ""),
         ("write_refusal(part, status, &frames[2]);", ""),
