@@ -11,6 +11,8 @@ from cantools.database.can import Database, Message
 CYCLE_ATTRIBUTE = "GenMsgCycleTime"
 TIMEOUT_ATTRIBUTE = "MessageTimeoutTime"
 DATA_IDS_ATTRIBUTE = "E2EProfile2DataIdList"
+OPTIONAL_ATTRIBUTE = "MessageIsOptional"
+BOOT_STAGE_ATTRIBUTE = "MessageIsFromBootStage"
 ECU, PLANT = "ECU", "PLANT"
 
 
@@ -29,6 +31,11 @@ def load_database() -> Database:
     database = cantools.database.load_string(database_text(), database_format="dbc")
     assert isinstance(database, Database)
     return database
+
+
+def network_version(database: Database) -> int:
+    """Version of the frames' layout; one goes up whenever an old reader would misread a frame."""
+    return int(database.version or 0)
 
 
 def number_attribute(database: Database, message: Message, name: str) -> int:

@@ -7,18 +7,23 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from cantools import autosar
 from cantools.database.can import Database, Message, Signal
 
 from codegen.can_database import (
+    BOOT_STAGE_ATTRIBUTE,
     CYCLE_ATTRIBUTE,
     ECU,
+    OPTIONAL_ATTRIBUTE,
     TIMEOUT_ATTRIBUTE,
     data_ids,
     load_database,
+    network_version,
     number_attribute,
 )
 from codegen.rendering import environment
 
+_EXAMPLE = "ChargeCommand"
 _LIMITS = (
     "E2EMaxDeltaCounter",
     "E2EWindowSize",
@@ -29,14 +34,17 @@ _LIMITS = (
 
 
 def can_document(firmware: Path) -> str:
-    """Text of docs/can.md from the database and firmware/{include/monitor.h,src/monitor.c}."""
+    """Text of docs/can.md from the database, and the faults and CRC of the sources in a folder."""
     database = load_database()
     messages = sorted(database.messages, key=lambda message: message.frame_id)
     return (
         environment()
         .get_template("can.md.j2")
         .render(
+            version=network_version(database),
             messages=[_message(database, message) for message in messages],
+            crc=_crc(firmware),
+            example=_example(database),
             limit_names=[name.removeprefix("E2E") for name in _LIMITS],
             faults=list(_faults(firmware)),
         )
@@ -44,13 +52,12 @@ def can_document(firmware: Path) -> str:
 
 
 def _message(database: Database, message: Message) -> dict[str, Any]:
-    is_for_ecu = message.senders != [ECU]
     timeout_ms = number_attribute(database, message, TIMEOUT_ATTRIBUTE)
     return {
         "name": message.name,
         "id": message.frame_id,
         "length": message.length,
-        "direction": "plant to ECU" if is_for_ecu else "ECU to plant",
+        "direction": _direction(database, message),
         "cycle_ms": number_attribute(database, message, CYCLE_ATTRIBUTE),
         "timeout_ms": timeout_ms,
         "is_protected": bool(data_ids(message)),
@@ -62,18 +69,56 @@ def _message(database: Database, message: Message) -> dict[str, Any]:
     }
 
 
+def _direction(database: Database, message: Message) -> str:
+    if message.senders != [ECU]:
+        is_optional = number_attribute(database, message, OPTIONAL_ATTRIBUTE)
+        return "plant to ECU, optional" if is_optional else "plant to ECU"
+    is_from_boot_stage = number_attribute(database, message, BOOT_STAGE_ATTRIBUTE)
+    return "ECU to plant, boot stage only" if is_from_boot_stage else "ECU to plant"
+
+
+def _crc(firmware: Path) -> dict[str, str]:
+    """Start value and final exclusive or, by the names that the firmware has for them."""
+    source = (firmware / "src" / "e2e.c").read_text(encoding="utf-8")
+    return {
+        name.lower(): f"0x{int(value, 16):02X}"
+        for name, value in re.findall(r"#define CRC8_(START|FINAL_XOR) (0x\w+)u", source)
+    }
+
+
+def _example(database: Database) -> dict[str, str]:
+    """A frame that others can try their CRC on."""
+    message, counter = database.get_message_by_name(_EXAMPLE), 1
+    values = {name: 0 for name in (signal.name for signal in message.signals)}
+    values |= {f"{_EXAMPLE}Counter": counter, "CommandState": 1}
+    data = message.encode(values, strict=False)
+    whole = autosar.apply_profile2_crc(data, data_ids(message)[counter])
+    assert whole is not None
+    return {
+        "name": _EXAMPLE,
+        "counter": str(counter),
+        "data_id": f"0x{data_ids(message)[counter]:02X}",
+        "data": bytes(whole).hex(" "),
+    }
+
+
 def _signal(signal: Signal) -> dict[str, Any]:
     choices = {int(value): str(name) for value, name in (signal.choices or {}).items()}
     notes = [", ".join(f"{value} = {name}" for value, name in choices.items())]
     return {
         "name": signal.name,
         "bits": f"{signal.start}…{signal.start + signal.length - 1}",
-        "range": f"{signal.minimum:.10g} … {signal.maximum:.10g}",
+        "range": f"{_number(signal.minimum)} … {_number(signal.maximum)}",
         "resolution": f"{signal.scale:g}",
         "unit": signal.unit or "",
         "not_available": f"0x{2**signal.length - 1:X}" if signal.unit else "",
         "note": "; ".join(filter(None, [*notes, signal.comment])),
     }
+
+
+def _number(value: float | None) -> str:
+    assert value is not None, "every signal of the database has its range"
+    return str(int(value)) if value == int(value) else f"{value:.10g}"
 
 
 def _faults(firmware: Path) -> Iterator[dict[str, Any]]:

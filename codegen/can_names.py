@@ -7,7 +7,7 @@ from typing import Any
 from cantools.database.can import Database
 from cantools.database.can.c_source import camel_to_snake_case
 
-from codegen.can_database import ECU, PLANT, database_digest, load_database
+from codegen.can_database import ECU, PLANT, database_digest, load_database, network_version
 from codegen.rendering import environment
 
 FILE_NAME = "catalog.py"
@@ -26,6 +26,7 @@ def can_names() -> dict[str, str]:
         .get_template("can_names.py.j2")
         .render(
             digest=database_digest(),
+            network_version=network_version(database),
             messages=[
                 {"constant": _constant(m.name), "name": m.name, "id": m.frame_id} for m in messages
             ],

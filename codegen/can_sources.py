@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
@@ -9,12 +10,15 @@ from cantools.database.can import Database, Message, Signal
 from cantools.database.can.c_source import camel_to_snake_case, generate
 
 from codegen.can_database import (
+    BOOT_STAGE_ATTRIBUTE,
     CYCLE_ATTRIBUTE,
     ECU,
+    OPTIONAL_ATTRIBUTE,
     PLANT,
     data_ids,
     database_digest,
     load_database,
+    network_version,
     number_attribute,
 )
 from codegen.rendering import environment, float_literal
@@ -47,17 +51,25 @@ def _without_date(text: str) -> str:
 
 
 def _catalogue(database: Database) -> dict[str, Any]:
-    def messages(sender: str) -> list[dict[str, Any]]:
-        found = [m for m in database.messages if m.senders == [sender] and m.length > 0]
+    def messages(sender: str, is_from_boot_stage: bool = False) -> list[dict[str, Any]]:
+        found = [
+            m
+            for m in database.messages
+            if m.senders == [sender]
+            and m.length > 0
+            and bool(number_attribute(database, m, BOOT_STAGE_ATTRIBUTE)) == is_from_boot_stage
+        ]
         # The charge command ends a period for whoever waits for it.
         found.sort(key=lambda m: (m.name == "ChargeCommand", m.frame_id))
         return [_message(database, m) for m in found]
 
     signals = [s for m in database.messages for s in m.signals if s.unit]
     return {
+        "network_version": network_version(database),
         "digest": database_digest(),
         "received": messages(PLANT),
         "transmitted": messages(ECU),
+        "boot_stage": messages(ECU, is_from_boot_stage=True),
         "signals": [_signal(s) for s in signals],
     }
 
@@ -74,6 +86,7 @@ def _message(database: Database, message: Message) -> dict[str, Any]:
         "id": message.frame_id,
         "length": message.length,
         "is_protected": int(bool(literals)),
+        "is_optional": number(OPTIONAL_ATTRIBUTE),
         "every_periods": number(CYCLE_ATTRIBUTE) // period_ms,
         "max_delta_counter": number("E2EMaxDeltaCounter"),
         "window_periods": number("E2EWindowSize"),
@@ -86,10 +99,13 @@ def _message(database: Database, message: Message) -> dict[str, Any]:
 
 
 def _signal(signal: Signal) -> dict[str, Any]:
+    offset_steps = round(signal.offset / signal.scale)
+    # A whole number of steps keeps the zero exact and the rounding relative to the value.
+    assert math.isclose(offset_steps * signal.scale, signal.offset, abs_tol=1e-9 * signal.scale)
     return {
         "name": camel_to_snake_case(signal.name).upper(),
         "unit": signal.unit,
         "scale": float_literal(float(signal.scale)),
-        "offset": float_literal(float(signal.offset)),
+        "offset_steps": offset_steps,
         "raw_max": 2**signal.length - 1 - RESERVED_CODES,
     }

@@ -19,8 +19,9 @@ import numpy as np
 
 from bms.barrier.constants import barrier_constants
 from bms.barrier.rates import Weights, largest_rate
-from bms.barrier.readings import BUS, BusQuantisation, reading_errors, soc_error_bound
+from bms.barrier.readings import reading_errors, soc_error_bound
 from bms.barrier.rounding import CONSTANT_ROUNDINGS, ROUNDINGS, UNIT, rounding_allowances
+from bms.bus_signals import BUS, BusQuantisation
 from bms.cell import CellParameters
 from bms.decision import ConstraintMargins
 from bms.presets.schema import Preset

@@ -7,32 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from bms.barrier.rounding import ROUNDINGS, UNIT
+from bms.bus_signals import BUS, BusQuantisation
 from bms.cell import CellParameters
 from bms.presets.schema import Preset
 
 COUNTING_HORIZON_S = 3600.0
 """Longest charge over which coulomb counting has to stay within its error bound."""
-
-
-@dataclass(frozen=True)
-class BusQuantisation:
-    """Half a step of each signal on the bus that is measured or given at plug-in.
-
-    Commands are rounded towards zero, but for values that float32 puts just below a step:
-    `command_A` is the most by which a command exceeds what was decided. All equal to the CAN
-    database and the codec by tests.
-    """
-
-    current_A: float = 0.001
-    surface_temperature_K: float = 0.0025
-    coolant_temperature_K: float = 0.0025
-    cooling_power_W: float = 0.0005
-    plug_in_soc: float = 1e-5
-    command_A: float = 5e-5
-
-
-BUS = BusQuantisation()
-"""The bus of the firmware."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bms.arrays import Array
-from bms.barrier.readings import BUS, BusQuantisation
+from bms.bus_signals import BUS, BusQuantisation
 from bms.cell import CellParameters
 from bms.errors import InputError
 from bms.presets.schema import Preset

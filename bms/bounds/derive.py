@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from bms.arrays import Array
-from bms.barrier import BusQuantisation
 from bms.bounds.conformal import CONFIDENCE, over_blocks, over_profiles
 from bms.bounds.readings import measurement_error_K
 from bms.bounds.record import ErrorBounds
 from bms.bounds.theorem import theorem_bound
 from bms.bounds.worst_case import Effort, worst_case
+from bms.bus_signals import BusQuantisation
 from bms.data.simulate import Samples
 from bms.kan.network import Network
 from bms.presets import Preset

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bms.arrays import Array
-from bms.barrier import BusQuantisation
+from bms.bus_signals import BusQuantisation
 from bms.kan.network import INPUT_NAMES, Network
 from bms.presets.schema import Sensors
 

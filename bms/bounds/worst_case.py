@@ -2,8 +2,8 @@
 
 Profiles begin at thermal rest anywhere in the operating box; then come a few currents between none
 and the reference current, each held for a while, full steps included. What counts is every sample
-whose estimate the firmware would trust and whose core is at most 2 K over its limit: as long as
-the bound holds there, the controller keeps the cell there.
+whose estimate the firmware would trust and whose core is at most 2 K over its limit (the preset's
+`core_limit_of_bound_K`): as long as the bound holds there, the controller keeps the cell there.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def worst_case(
 def _errors_K(network: Network, preset: Preset, samples: Samples) -> Array:
     """|estimate - truth| (N,) where the estimate is trusted and the cell not too hot, else 0."""
     estimate_K, in_domain = network.evaluate(samples.inputs)
-    hottest_K = preset.limits.max_core_temperature_K + CORE_BEYOND_LIMIT_K
+    hottest_K = preset.core_limit_of_bound_K + CORE_BEYOND_LIMIT_K
     counts = in_domain & (samples.core_temperature_K <= hottest_K)
     return np.abs(estimate_K - samples.core_temperature_K) * counts
 

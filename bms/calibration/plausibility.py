@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from bms.bus_signals import RANGES
+from bms.errors import InputError
 from bms.presets import Preset
 
 _SENSOR_RANGES = {
@@ -58,11 +60,26 @@ _DEVIATIONS = {
 
 
 def plausibility_fields(preset: Preset) -> dict[str, Any]:
-    """Content of the calibration's plausibility_t as nested mapping, in the units of its names."""
+    """Content of the calibration's plausibility_t as nested mapping, in the units of its names.
+
+    Raises InputError when a reading that is not believed would not fit its CAN signal, which would
+    carry the end of its range instead, a reading that is.
+    """
     strongest_A = -_CURRENT_RANGE_FACTOR * preset.limits.reference_current_A
     ranges = {
         "current_A": (-strongest_A, strongest_A),
         "voltage_V": (_LOWEST_VOLTAGE_V, preset.limits.max_voltage_V + _VOLTAGE_HEADROOM_V),
         **_SENSOR_RANGES,
     }
+    for key, name, carried in (
+        ("limits.reference_current_A", "current_A", RANGES.current_A),
+        ("limits.max_voltage_V", "voltage_V", RANGES.voltage_V),
+    ):
+        (low, high), (lowest, highest) = ranges[name], carried
+        if not lowest <= low <= high < highest:
+            value = getattr(preset.limits, key.removeprefix("limits."))
+            raise InputError(
+                f"preset '{preset.name}': {key}: {value:.10g} leaves no room on the CAN signal for "
+                f"readings that cannot be, which begin at {high:.10g} of {highest:.10g}; lower it"
+            )
     return {name: {"low": low, "high": high} for name, (low, high) in ranges.items()} | _DEVIATIONS

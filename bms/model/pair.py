@@ -39,7 +39,7 @@ def check_pair(preset: Preset, model: KanModel) -> None:
         )
     if model.training_hash is not None and model.training_hash != preset.training_hash:
         raise ModelMismatchError(
-            f"model {model.hash[:8]} was trained for preset '{model.preset}' with other cell, "
-            f"uncertainty or box than preset '{preset.name}' has; train it again with "
+            f"model {model.hash[:8]} was trained for preset '{model.preset}' with another cell, "
+            f"box, sensors, period or limits than preset '{preset.name}' has; train it again with "
             f"'bms train --preset {preset.name} --out model.json'"
         )

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Annotated
 
 from annotated_types import Ge, Gt, Le, MultipleOf
 
+from bms.bus_signals import RANGES, Interval
 from bms.cell import CellParameters
 from bms.errors import InputError
+from bms.presets.digest import digest, plain
 from bms.validation import Finite, Negative, NonNegative, Positive, strict
 
 
@@ -156,6 +157,10 @@ class OperatingBox:
         )
 
 
+BOX_ABOVE_CORE_LIMIT_K = 3.0
+"""By how much the surface's box reaches over the core limit that a bound is made for, at most."""
+
+
 @strict
 @dataclass(frozen=True)
 class Preset:
@@ -174,6 +179,13 @@ class Preset:
     operating_box: OperatingBox
 
     def __post_init__(self) -> None:
+        for key, values, (lowest, highest) in self._on_the_bus():
+            for value in values:
+                if not lowest <= value <= highest:
+                    raise InputError(
+                        f"{key}: {value:.10g} does not fit the CAN signal, which carries "
+                        f"{lowest:.10g} to {highest:.10g}"
+                    )
         low, high = self.operating_box.current_A
         if not low < self.limits.reference_current_A < 0.0 < high:
             raise InputError(
@@ -184,26 +196,56 @@ class Preset:
 
     @cached_property
     def hash(self) -> str:
-        """SHA-256 of the whole content, as hexadecimal text."""
-        return _digest(asdict(self))
+        """SHA-256 of the whole content but for what has its default, as hexadecimal text."""
+        return digest(self)
 
     @property
     def training_hash(self) -> str:
-        """SHA-256 of what an estimator and its error bound depend on.
+        """SHA-256 of what an estimator, its errors and its bound depend on, as hexadecimal text.
 
-        The bound covers the errors of the sensors and full steps of the current, so both belong to
-        it as much as cell, uncertainty and box, from which training data are simulated.
+        Training and test data are profiles of the thermal model (cell, capacity included, as a
+        profile ends when it is full) within the operating box; profiles of the bound's search jump
+        to the reference current and count up to `core_limit_of_bound_K`. The bound adds the errors
+        of the four sensors that the estimator reads, and the rounding of its filters in each
+        sampling period. Nothing of it sees a voltage. The data have a noise of their own instead of
+        the preset's uncertainty, and what limits, gains, timing and plug-in state say beyond the
+        above is the controller's.
         """
-        return _digest(
-            [
-                asdict(self.cell),
-                asdict(self.uncertainty),
-                asdict(self.operating_box),
-                asdict(self.sensors),
-                self.limits.reference_current_A,
-            ]
+        cell, sensors = plain(self.cell), plain(self.sensors)
+        del cell["ocv"], sensors["voltage_V"]
+        return digest(
+            {
+                "cell": cell,
+                "operating_box": self.operating_box,
+                "sensors": sensors,
+                "reference_current_A": self.limits.reference_current_A,
+                "core_limit_of_bound_K": self.core_limit_of_bound_K,
+                "sampling_period_s": self.timing.sampling_period_s,
+            }
         )
 
+    @property
+    def core_limit_of_bound_K(self) -> float:
+        """Limit of the core temperature that an estimator's error bound is made for.
 
-def _digest(content: object) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        The preset's own, but not much less than what the box allows: so a model stays usable, and
+        its bound right, when the limit is lowered, and only then.
+        """
+        hottest_K = self.operating_box.surface_temperature_K[1]
+        return max(self.limits.max_core_temperature_K, hottest_K - BOX_ABOVE_CORE_LIMIT_K)
+
+    def _on_the_bus(self) -> Iterator[tuple[str, tuple[float, ...], Interval]]:
+        """Key, values and range of everything that the CAN bus has to carry."""
+        limits, start, box = self.limits, self.initial, self.operating_box
+        temperature_K, power_W = RANGES.temperature_K, RANGES.cooling_power_W
+        yield "limits.reference_current_A", (limits.reference_current_A,), RANGES.current_A
+        yield "limits.max_voltage_V", (limits.max_voltage_V,), RANGES.voltage_V
+        yield "limits.max_core_temperature_K", (limits.max_core_temperature_K,), temperature_K
+        yield "limits.max_surface_temperature_K", (limits.max_surface_temperature_K,), temperature_K
+        yield "initial.temperature_K", (start.temperature_K,), temperature_K
+        yield "initial.cooling_power_W", (start.cooling_power_W,), power_W
+        yield "cell.ocv.voltage_V", self.cell.ocv.voltage_V, RANGES.voltage_V
+        yield "operating_box.current_A", box.current_A, RANGES.current_A
+        yield "operating_box.cooling_power_W", box.cooling_power_W, power_W
+        yield "operating_box.surface_temperature_K", box.surface_temperature_K, temperature_K
+        yield "operating_box.coolant_temperature_K", box.coolant_temperature_K, temperature_K

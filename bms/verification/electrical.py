@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from bms.arrays import Array
-from bms.barrier import BUS
 from bms.barrier.margins import charge_taken_up, decision_allowances, strongest_current_A
 from bms.barrier.readings import soc_error_bound
 from bms.barrier.rounding import ARITHMETIC_ROUNDINGS
+from bms.bus_signals import BUS
 from bms.presets import Preset
 from bms.verification.certificate import Certificate, Shortfall
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from bms.barrier import BUS
 from bms.barrier.margins import decision_allowances
 from bms.barrier.readings import reading_errors
 from bms.barrier.rounding import ARITHMETIC_ROUNDINGS
+from bms.bus_signals import BUS
 from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.verification.barriers import Barrier
@@ -162,7 +162,7 @@ def verify(
         held_s=core_domain.held_s,
         error_bound_K=constants["estimation_error_bound_K"],
         margins={name: constants[name] for name in MARGINS.values()},
-        barriers=results,
+        barriers=tuple(results),
         refusals=refusals,
         fallback=fallback,
         obstacles=obstacles(preset, constants, fallback),

@@ -1,9 +1,8 @@
 /* What the boot stage says on the bus when it does not start the application: no current, and why.
  *
  * The frames are those of the database, protected as the application's: ChargeCommand with 0 A in
- * state Fault, Diagnostics with the fault Calibration, and Identity with firmware version 0, whose
- * model hash says why: the refused part (1 application, 2 calibration, 3 boot stage) times 256
- * plus the number of the failed check (image_status_t).
+ * state Fault, Diagnostics with the fault Calibration, Identity with firmware version 0, and
+ * BootRefusal, which says why.
  */
 #ifndef REFUSAL_H
 #define REFUSAL_H
@@ -13,7 +12,7 @@
 #include "can_frame.h"
 #include "image.h"
 
-#define REFUSAL_FRAMES 3
+#define REFUSAL_FRAMES 4
 #define REFUSAL_PERIOD_MS 100u
 
 typedef enum {

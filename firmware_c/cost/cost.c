@@ -24,8 +24,9 @@ typedef struct {
 
 typedef struct {
     uint32_t kind; /* record_kind_t */
+    uint32_t frames; /* that the ECU receives in a period */
     union {
-        can_frame_t frames[CAN_RECEIVED_COUNT]; /* what the ECU receives in a period */
+        can_frame_t frames[CAN_RECEIVED_COUNT];
         state_t state;
     } content;
 } record_t;
@@ -65,7 +66,7 @@ static void decide(cost_t *cost)
 
 static void run_period(cost_t *cost)
 {
-    for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
+    for (uint32_t i = 0u; i < cost->record.frames; i++) {
         bms_receive(&cost->bms, &cost->record.content.frames[i]);
     }
     bms_step(&cost->bms);

@@ -57,6 +57,14 @@ static inline uint8_t pack_left_shift_u32(
     return (uint8_t)((uint8_t)(value << shift) & mask);
 }
 
+static inline uint8_t pack_left_shift_u64(
+    uint64_t value,
+    uint8_t shift,
+    uint8_t mask)
+{
+    return (uint8_t)((uint8_t)(value << shift) & mask);
+}
+
 static inline uint8_t pack_right_shift_u16(
     uint16_t value,
     uint8_t shift,
@@ -67,6 +75,14 @@ static inline uint8_t pack_right_shift_u16(
 
 static inline uint8_t pack_right_shift_u32(
     uint32_t value,
+    uint8_t shift,
+    uint8_t mask)
+{
+    return (uint8_t)((uint8_t)(value >> shift) & mask);
+}
+
+static inline uint8_t pack_right_shift_u64(
+    uint64_t value,
     uint8_t shift,
     uint8_t mask)
 {
@@ -87,6 +103,14 @@ static inline uint32_t unpack_left_shift_u32(
     uint8_t mask)
 {
     return (uint32_t)((uint32_t)(value & mask) << shift);
+}
+
+static inline uint64_t unpack_left_shift_u64(
+    uint8_t value,
+    uint8_t shift,
+    uint8_t mask)
+{
+    return (uint64_t)((uint64_t)(value & mask) << shift);
 }
 
 static inline uint8_t unpack_right_shift_u8(
@@ -111,6 +135,14 @@ static inline uint32_t unpack_right_shift_u32(
     uint8_t mask)
 {
     return (uint32_t)((uint32_t)(value & mask) >> shift);
+}
+
+static inline uint64_t unpack_right_shift_u64(
+    uint8_t value,
+    uint8_t shift,
+    uint8_t mask)
+{
+    return (uint64_t)((uint64_t)(value & mask) >> shift);
 }
 
 int can_db_sync_pack(
@@ -150,12 +182,11 @@ int can_db_cell_electrical_pack(
 
     dst_p[0] |= pack_left_shift_u8(src_p->cell_electrical_crc, 0u, 0xffu);
     dst_p[1] |= pack_left_shift_u8(src_p->cell_electrical_counter, 0u, 0x0fu);
-    dst_p[1] |= pack_left_shift_u16(src_p->current, 4u, 0xf0u);
-    dst_p[2] |= pack_right_shift_u16(src_p->current, 4u, 0xffu);
-    dst_p[3] |= pack_right_shift_u16(src_p->current, 12u, 0x0fu);
-    dst_p[3] |= pack_left_shift_u16(src_p->voltage, 4u, 0xf0u);
-    dst_p[4] |= pack_right_shift_u16(src_p->voltage, 4u, 0xffu);
-    dst_p[5] |= pack_right_shift_u16(src_p->voltage, 12u, 0x0fu);
+    dst_p[1] |= pack_left_shift_u32(src_p->current, 4u, 0xf0u);
+    dst_p[2] |= pack_right_shift_u32(src_p->current, 4u, 0xffu);
+    dst_p[3] |= pack_right_shift_u32(src_p->current, 12u, 0xffu);
+    dst_p[4] |= pack_left_shift_u16(src_p->voltage, 0u, 0xffu);
+    dst_p[5] |= pack_right_shift_u16(src_p->voltage, 8u, 0xffu);
 
     return (6);
 }
@@ -171,12 +202,11 @@ int can_db_cell_electrical_unpack(
 
     dst_p->cell_electrical_crc = unpack_right_shift_u8(src_p[0], 0u, 0xffu);
     dst_p->cell_electrical_counter = unpack_right_shift_u8(src_p[1], 0u, 0x0fu);
-    dst_p->current = unpack_right_shift_u16(src_p[1], 4u, 0xf0u);
-    dst_p->current |= unpack_left_shift_u16(src_p[2], 4u, 0xffu);
-    dst_p->current |= unpack_left_shift_u16(src_p[3], 12u, 0x0fu);
-    dst_p->voltage = unpack_right_shift_u16(src_p[3], 4u, 0xf0u);
-    dst_p->voltage |= unpack_left_shift_u16(src_p[4], 4u, 0xffu);
-    dst_p->voltage |= unpack_left_shift_u16(src_p[5], 12u, 0x0fu);
+    dst_p->current = unpack_right_shift_u32(src_p[1], 4u, 0xf0u);
+    dst_p->current |= unpack_left_shift_u32(src_p[2], 4u, 0xffu);
+    dst_p->current |= unpack_left_shift_u32(src_p[3], 12u, 0xffu);
+    dst_p->voltage = unpack_right_shift_u16(src_p[4], 0u, 0xffu);
+    dst_p->voltage |= unpack_left_shift_u16(src_p[5], 8u, 0xffu);
 
     return (0);
 }
@@ -212,14 +242,14 @@ bool can_db_cell_electrical_cell_electrical_counter_is_in_phys_range(double valu
     return ((value >= 0.0) && (value <= 15.0));
 }
 
-bool can_db_cell_electrical_current_is_in_range(uint16_t value)
+bool can_db_cell_electrical_current_is_in_range(uint32_t value)
 {
-    return (value <= 65533u);
+    return (value <= 1048573u);
 }
 
 bool can_db_cell_electrical_current_is_in_phys_range(double value)
 {
-    return ((value >= -65.0) && (value <= 66.066));
+    return ((value >= -1048.576) && (value <= 1048.57));
 }
 
 bool can_db_cell_electrical_voltage_is_in_range(uint16_t value)
@@ -411,21 +441,23 @@ int can_db_charge_request_pack(
     const struct can_db_charge_request_t *src_p,
     size_t size)
 {
-    if (size < 6u) {
+    if (size < 7u) {
         return (-EINVAL);
     }
 
-    memset(&dst_p[0], 0, 6);
+    memset(&dst_p[0], 0, 7);
 
     dst_p[0] |= pack_left_shift_u8(src_p->charge_request_crc, 0u, 0xffu);
     dst_p[1] |= pack_left_shift_u8(src_p->charge_request_counter, 0u, 0x0fu);
     dst_p[1] |= pack_left_shift_u8(src_p->request, 4u, 0xf0u);
-    dst_p[2] |= pack_left_shift_u16(src_p->reference_current, 0u, 0xffu);
-    dst_p[3] |= pack_right_shift_u16(src_p->reference_current, 8u, 0xffu);
-    dst_p[4] |= pack_left_shift_u16(src_p->plug_in_state_of_charge, 0u, 0xffu);
-    dst_p[5] |= pack_right_shift_u16(src_p->plug_in_state_of_charge, 8u, 0xffu);
+    dst_p[2] |= pack_left_shift_u32(src_p->reference_current, 0u, 0xffu);
+    dst_p[3] |= pack_right_shift_u32(src_p->reference_current, 8u, 0xffu);
+    dst_p[4] |= pack_right_shift_u32(src_p->reference_current, 16u, 0x0fu);
+    dst_p[4] |= pack_left_shift_u16(src_p->plug_in_state_of_charge, 4u, 0xf0u);
+    dst_p[5] |= pack_right_shift_u16(src_p->plug_in_state_of_charge, 4u, 0xffu);
+    dst_p[6] |= pack_right_shift_u16(src_p->plug_in_state_of_charge, 12u, 0x0fu);
 
-    return (6);
+    return (7);
 }
 
 int can_db_charge_request_unpack(
@@ -433,17 +465,19 @@ int can_db_charge_request_unpack(
     const uint8_t *src_p,
     size_t size)
 {
-    if (size < 6u) {
+    if (size < 7u) {
         return (-EINVAL);
     }
 
     dst_p->charge_request_crc = unpack_right_shift_u8(src_p[0], 0u, 0xffu);
     dst_p->charge_request_counter = unpack_right_shift_u8(src_p[1], 0u, 0x0fu);
     dst_p->request = unpack_right_shift_u8(src_p[1], 4u, 0xf0u);
-    dst_p->reference_current = unpack_right_shift_u16(src_p[2], 0u, 0xffu);
-    dst_p->reference_current |= unpack_left_shift_u16(src_p[3], 8u, 0xffu);
-    dst_p->plug_in_state_of_charge = unpack_right_shift_u16(src_p[4], 0u, 0xffu);
-    dst_p->plug_in_state_of_charge |= unpack_left_shift_u16(src_p[5], 8u, 0xffu);
+    dst_p->reference_current = unpack_right_shift_u32(src_p[2], 0u, 0xffu);
+    dst_p->reference_current |= unpack_left_shift_u32(src_p[3], 8u, 0xffu);
+    dst_p->reference_current |= unpack_left_shift_u32(src_p[4], 16u, 0x0fu);
+    dst_p->plug_in_state_of_charge = unpack_right_shift_u16(src_p[4], 4u, 0xf0u);
+    dst_p->plug_in_state_of_charge |= unpack_left_shift_u16(src_p[5], 4u, 0xffu);
+    dst_p->plug_in_state_of_charge |= unpack_left_shift_u16(src_p[6], 12u, 0x0fu);
 
     return (0);
 }
@@ -489,14 +523,14 @@ bool can_db_charge_request_request_is_in_phys_range(double value)
     return ((value >= 0.0) && (value <= 15.0));
 }
 
-bool can_db_charge_request_reference_current_is_in_range(uint16_t value)
+bool can_db_charge_request_reference_current_is_in_range(uint32_t value)
 {
-    return (value <= 65533u);
+    return (value <= 1048573u);
 }
 
 bool can_db_charge_request_reference_current_is_in_phys_range(double value)
 {
-    return ((value >= -65.0) && (value <= 66.066));
+    return ((value >= -1048.576) && (value <= 1048.57));
 }
 
 bool can_db_charge_request_plug_in_state_of_charge_is_in_range(uint16_t value)
@@ -509,9 +543,9 @@ bool can_db_charge_request_plug_in_state_of_charge_is_in_phys_range(double value
     return ((value >= 0.0) && (value <= 1.31066));
 }
 
-int can_db_charge_command_pack(
+int can_db_charge_mode_pack(
     uint8_t *dst_p,
-    const struct can_db_charge_command_t *src_p,
+    const struct can_db_charge_mode_t *src_p,
     size_t size)
 {
     if (size < 4u) {
@@ -520,18 +554,17 @@ int can_db_charge_command_pack(
 
     memset(&dst_p[0], 0, 4);
 
-    dst_p[0] |= pack_left_shift_u8(src_p->charge_command_crc, 0u, 0xffu);
-    dst_p[1] |= pack_left_shift_u8(src_p->charge_command_counter, 0u, 0x0fu);
-    dst_p[1] |= pack_left_shift_u16(src_p->command_current, 4u, 0xf0u);
-    dst_p[2] |= pack_right_shift_u16(src_p->command_current, 4u, 0xffu);
-    dst_p[3] |= pack_right_shift_u16(src_p->command_current, 12u, 0x0fu);
-    dst_p[3] |= pack_left_shift_u8(src_p->command_state, 4u, 0xf0u);
+    dst_p[0] |= pack_left_shift_u8(src_p->charge_mode_crc, 0u, 0xffu);
+    dst_p[1] |= pack_left_shift_u8(src_p->charge_mode_counter, 0u, 0x0fu);
+    dst_p[1] |= pack_left_shift_u8(src_p->mode, 4u, 0xf0u);
+    dst_p[2] |= pack_left_shift_u16(src_p->time_to_full, 0u, 0xffu);
+    dst_p[3] |= pack_right_shift_u16(src_p->time_to_full, 8u, 0xffu);
 
     return (4);
 }
 
-int can_db_charge_command_unpack(
-    struct can_db_charge_command_t *dst_p,
+int can_db_charge_mode_unpack(
+    struct can_db_charge_mode_t *dst_p,
     const uint8_t *src_p,
     size_t size)
 {
@@ -539,12 +572,102 @@ int can_db_charge_command_unpack(
         return (-EINVAL);
     }
 
+    dst_p->charge_mode_crc = unpack_right_shift_u8(src_p[0], 0u, 0xffu);
+    dst_p->charge_mode_counter = unpack_right_shift_u8(src_p[1], 0u, 0x0fu);
+    dst_p->mode = unpack_right_shift_u8(src_p[1], 4u, 0xf0u);
+    dst_p->time_to_full = unpack_right_shift_u16(src_p[2], 0u, 0xffu);
+    dst_p->time_to_full |= unpack_left_shift_u16(src_p[3], 8u, 0xffu);
+
+    return (0);
+}
+
+int can_db_charge_mode_init(struct can_db_charge_mode_t *msg_p)
+{
+    if (msg_p == NULL) return -1;
+
+    memset(msg_p, 0, sizeof(struct can_db_charge_mode_t));
+
+    return 0;
+}
+
+bool can_db_charge_mode_charge_mode_crc_is_in_range(uint8_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_charge_mode_charge_mode_crc_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 255.0));
+}
+
+bool can_db_charge_mode_charge_mode_counter_is_in_range(uint8_t value)
+{
+    return (value <= 15u);
+}
+
+bool can_db_charge_mode_charge_mode_counter_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 15.0));
+}
+
+bool can_db_charge_mode_mode_is_in_range(uint8_t value)
+{
+    return (value <= 15u);
+}
+
+bool can_db_charge_mode_mode_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 15.0));
+}
+
+bool can_db_charge_mode_time_to_full_is_in_range(uint16_t value)
+{
+    return (value <= 65533u);
+}
+
+bool can_db_charge_mode_time_to_full_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 65533.0));
+}
+
+int can_db_charge_command_pack(
+    uint8_t *dst_p,
+    const struct can_db_charge_command_t *src_p,
+    size_t size)
+{
+    if (size < 5u) {
+        return (-EINVAL);
+    }
+
+    memset(&dst_p[0], 0, 5);
+
+    dst_p[0] |= pack_left_shift_u8(src_p->charge_command_crc, 0u, 0xffu);
+    dst_p[1] |= pack_left_shift_u8(src_p->charge_command_counter, 0u, 0x0fu);
+    dst_p[1] |= pack_left_shift_u32(src_p->command_current, 4u, 0xf0u);
+    dst_p[2] |= pack_right_shift_u32(src_p->command_current, 4u, 0xffu);
+    dst_p[3] |= pack_right_shift_u32(src_p->command_current, 12u, 0xffu);
+    dst_p[4] |= pack_left_shift_u8(src_p->command_state, 0u, 0x0fu);
+
+    return (5);
+}
+
+int can_db_charge_command_unpack(
+    struct can_db_charge_command_t *dst_p,
+    const uint8_t *src_p,
+    size_t size)
+{
+    if (size < 5u) {
+        return (-EINVAL);
+    }
+
     dst_p->charge_command_crc = unpack_right_shift_u8(src_p[0], 0u, 0xffu);
     dst_p->charge_command_counter = unpack_right_shift_u8(src_p[1], 0u, 0x0fu);
-    dst_p->command_current = unpack_right_shift_u16(src_p[1], 4u, 0xf0u);
-    dst_p->command_current |= unpack_left_shift_u16(src_p[2], 4u, 0xffu);
-    dst_p->command_current |= unpack_left_shift_u16(src_p[3], 12u, 0x0fu);
-    dst_p->command_state = unpack_right_shift_u8(src_p[3], 4u, 0xf0u);
+    dst_p->command_current = unpack_right_shift_u32(src_p[1], 4u, 0xf0u);
+    dst_p->command_current |= unpack_left_shift_u32(src_p[2], 4u, 0xffu);
+    dst_p->command_current |= unpack_left_shift_u32(src_p[3], 12u, 0xffu);
+    dst_p->command_state = unpack_right_shift_u8(src_p[4], 0u, 0x0fu);
 
     return (0);
 }
@@ -580,14 +703,14 @@ bool can_db_charge_command_charge_command_counter_is_in_phys_range(double value)
     return ((value >= 0.0) && (value <= 15.0));
 }
 
-bool can_db_charge_command_command_current_is_in_range(uint16_t value)
+bool can_db_charge_command_command_current_is_in_range(uint32_t value)
 {
-    return (value <= 65533u);
+    return (value <= 1048573u);
 }
 
 bool can_db_charge_command_command_current_is_in_phys_range(double value)
 {
-    return ((value >= -65.0) && (value <= 66.066));
+    return ((value >= -1048.576) && (value <= 1048.57));
 }
 
 bool can_db_charge_command_command_state_is_in_range(uint8_t value)
@@ -726,22 +849,24 @@ int can_db_decision_pack(
     const struct can_db_decision_t *src_p,
     size_t size)
 {
-    if (size < 7u) {
+    if (size < 8u) {
         return (-EINVAL);
     }
 
-    memset(&dst_p[0], 0, 7);
+    memset(&dst_p[0], 0, 8);
 
     dst_p[0] |= pack_left_shift_u8(src_p->decision_crc, 0u, 0xffu);
     dst_p[1] |= pack_left_shift_u8(src_p->decision_counter, 0u, 0x0fu);
     dst_p[1] |= pack_left_shift_u8(src_p->active_constraint, 4u, 0xf0u);
     dst_p[2] |= pack_left_shift_u8(src_p->feasible, 0u, 0x03u);
-    dst_p[3] |= pack_left_shift_u16(src_p->lower_current, 0u, 0xffu);
-    dst_p[4] |= pack_right_shift_u16(src_p->lower_current, 8u, 0xffu);
-    dst_p[5] |= pack_left_shift_u16(src_p->upper_current, 0u, 0xffu);
-    dst_p[6] |= pack_right_shift_u16(src_p->upper_current, 8u, 0xffu);
+    dst_p[2] |= pack_left_shift_u32(src_p->lower_current, 4u, 0xf0u);
+    dst_p[3] |= pack_right_shift_u32(src_p->lower_current, 4u, 0xffu);
+    dst_p[4] |= pack_right_shift_u32(src_p->lower_current, 12u, 0xffu);
+    dst_p[5] |= pack_left_shift_u32(src_p->upper_current, 0u, 0xffu);
+    dst_p[6] |= pack_right_shift_u32(src_p->upper_current, 8u, 0xffu);
+    dst_p[7] |= pack_right_shift_u32(src_p->upper_current, 16u, 0x0fu);
 
-    return (7);
+    return (8);
 }
 
 int can_db_decision_unpack(
@@ -749,7 +874,7 @@ int can_db_decision_unpack(
     const uint8_t *src_p,
     size_t size)
 {
-    if (size < 7u) {
+    if (size < 8u) {
         return (-EINVAL);
     }
 
@@ -757,10 +882,12 @@ int can_db_decision_unpack(
     dst_p->decision_counter = unpack_right_shift_u8(src_p[1], 0u, 0x0fu);
     dst_p->active_constraint = unpack_right_shift_u8(src_p[1], 4u, 0xf0u);
     dst_p->feasible = unpack_right_shift_u8(src_p[2], 0u, 0x03u);
-    dst_p->lower_current = unpack_right_shift_u16(src_p[3], 0u, 0xffu);
-    dst_p->lower_current |= unpack_left_shift_u16(src_p[4], 8u, 0xffu);
-    dst_p->upper_current = unpack_right_shift_u16(src_p[5], 0u, 0xffu);
-    dst_p->upper_current |= unpack_left_shift_u16(src_p[6], 8u, 0xffu);
+    dst_p->lower_current = unpack_right_shift_u32(src_p[2], 4u, 0xf0u);
+    dst_p->lower_current |= unpack_left_shift_u32(src_p[3], 4u, 0xffu);
+    dst_p->lower_current |= unpack_left_shift_u32(src_p[4], 12u, 0xffu);
+    dst_p->upper_current = unpack_right_shift_u32(src_p[5], 0u, 0xffu);
+    dst_p->upper_current |= unpack_left_shift_u32(src_p[6], 8u, 0xffu);
+    dst_p->upper_current |= unpack_left_shift_u32(src_p[7], 16u, 0x0fu);
 
     return (0);
 }
@@ -816,24 +943,24 @@ bool can_db_decision_feasible_is_in_phys_range(double value)
     return ((value >= 0.0) && (value <= 3.0));
 }
 
-bool can_db_decision_lower_current_is_in_range(uint16_t value)
+bool can_db_decision_lower_current_is_in_range(uint32_t value)
 {
-    return (value <= 65533u);
+    return (value <= 1048573u);
 }
 
 bool can_db_decision_lower_current_is_in_phys_range(double value)
 {
-    return ((value >= -65.0) && (value <= 66.066));
+    return ((value >= -1048.576) && (value <= 1048.57));
 }
 
-bool can_db_decision_upper_current_is_in_range(uint16_t value)
+bool can_db_decision_upper_current_is_in_range(uint32_t value)
 {
-    return (value <= 65533u);
+    return (value <= 1048573u);
 }
 
 bool can_db_decision_upper_current_is_in_phys_range(double value)
 {
-    return ((value >= -65.0) && (value <= 66.066));
+    return ((value >= -1048.576) && (value <= 1048.57));
 }
 
 int can_db_decision_margins_pack(
@@ -1097,8 +1224,8 @@ int can_db_identity_pack(
     dst_p[3] |= pack_right_shift_u32(src_p->model_hash, 24u, 0xffu);
     dst_p[4] |= pack_left_shift_u16(src_p->preset_hash, 0u, 0xffu);
     dst_p[5] |= pack_right_shift_u16(src_p->preset_hash, 8u, 0xffu);
-    dst_p[6] |= pack_left_shift_u16(src_p->firmware_version, 0u, 0xffu);
-    dst_p[7] |= pack_right_shift_u16(src_p->firmware_version, 8u, 0xffu);
+    dst_p[6] |= pack_left_shift_u8(src_p->firmware_version, 0u, 0xffu);
+    dst_p[7] |= pack_left_shift_u8(src_p->network_version, 0u, 0xffu);
 
     return (8);
 }
@@ -1118,8 +1245,8 @@ int can_db_identity_unpack(
     dst_p->model_hash |= unpack_left_shift_u32(src_p[3], 24u, 0xffu);
     dst_p->preset_hash = unpack_right_shift_u16(src_p[4], 0u, 0xffu);
     dst_p->preset_hash |= unpack_left_shift_u16(src_p[5], 8u, 0xffu);
-    dst_p->firmware_version = unpack_right_shift_u16(src_p[6], 0u, 0xffu);
-    dst_p->firmware_version |= unpack_left_shift_u16(src_p[7], 8u, 0xffu);
+    dst_p->firmware_version = unpack_right_shift_u8(src_p[6], 0u, 0xffu);
+    dst_p->network_version = unpack_right_shift_u8(src_p[7], 0u, 0xffu);
 
     return (0);
 }
@@ -1157,7 +1284,7 @@ bool can_db_identity_preset_hash_is_in_phys_range(double value)
     return ((value >= 0.0) && (value <= 65535.0));
 }
 
-bool can_db_identity_firmware_version_is_in_range(uint16_t value)
+bool can_db_identity_firmware_version_is_in_range(uint8_t value)
 {
     (void)value;
 
@@ -1166,7 +1293,19 @@ bool can_db_identity_firmware_version_is_in_range(uint16_t value)
 
 bool can_db_identity_firmware_version_is_in_phys_range(double value)
 {
-    return ((value >= 0.0) && (value <= 65535.0));
+    return ((value >= 0.0) && (value <= 255.0));
+}
+
+bool can_db_identity_network_version_is_in_range(uint8_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_identity_network_version_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 255.0));
 }
 
 int can_db_network_diagnostics_pack(
@@ -1322,6 +1461,190 @@ bool can_db_network_diagnostics_reordered_frames_is_in_range(uint8_t value)
 }
 
 bool can_db_network_diagnostics_reordered_frames_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 255.0));
+}
+
+int can_db_diagnostics2_pack(
+    uint8_t *dst_p,
+    const struct can_db_diagnostics2_t *src_p,
+    size_t size)
+{
+    if (size < 7u) {
+        return (-EINVAL);
+    }
+
+    memset(&dst_p[0], 0, 7);
+
+    dst_p[0] |= pack_left_shift_u8(src_p->diagnostics2_crc, 0u, 0xffu);
+    dst_p[1] |= pack_left_shift_u8(src_p->diagnostics2_counter, 0u, 0x0fu);
+    dst_p[1] |= pack_left_shift_u8(src_p->fault_page, 4u, 0xf0u);
+    dst_p[2] |= pack_left_shift_u64(src_p->more_faults, 0u, 0xffu);
+    dst_p[3] |= pack_right_shift_u64(src_p->more_faults, 8u, 0xffu);
+    dst_p[4] |= pack_right_shift_u64(src_p->more_faults, 16u, 0xffu);
+    dst_p[5] |= pack_right_shift_u64(src_p->more_faults, 24u, 0xffu);
+    dst_p[6] |= pack_right_shift_u64(src_p->more_faults, 32u, 0xffu);
+
+    return (7);
+}
+
+int can_db_diagnostics2_unpack(
+    struct can_db_diagnostics2_t *dst_p,
+    const uint8_t *src_p,
+    size_t size)
+{
+    if (size < 7u) {
+        return (-EINVAL);
+    }
+
+    dst_p->diagnostics2_crc = unpack_right_shift_u8(src_p[0], 0u, 0xffu);
+    dst_p->diagnostics2_counter = unpack_right_shift_u8(src_p[1], 0u, 0x0fu);
+    dst_p->fault_page = unpack_right_shift_u8(src_p[1], 4u, 0xf0u);
+    dst_p->more_faults = unpack_right_shift_u64(src_p[2], 0u, 0xffu);
+    dst_p->more_faults |= unpack_left_shift_u64(src_p[3], 8u, 0xffu);
+    dst_p->more_faults |= unpack_left_shift_u64(src_p[4], 16u, 0xffu);
+    dst_p->more_faults |= unpack_left_shift_u64(src_p[5], 24u, 0xffu);
+    dst_p->more_faults |= unpack_left_shift_u64(src_p[6], 32u, 0xffu);
+
+    return (0);
+}
+
+int can_db_diagnostics2_init(struct can_db_diagnostics2_t *msg_p)
+{
+    if (msg_p == NULL) return -1;
+
+    memset(msg_p, 0, sizeof(struct can_db_diagnostics2_t));
+
+    return 0;
+}
+
+bool can_db_diagnostics2_diagnostics2_crc_is_in_range(uint8_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_diagnostics2_diagnostics2_crc_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 255.0));
+}
+
+bool can_db_diagnostics2_diagnostics2_counter_is_in_range(uint8_t value)
+{
+    return (value <= 15u);
+}
+
+bool can_db_diagnostics2_diagnostics2_counter_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 15.0));
+}
+
+bool can_db_diagnostics2_fault_page_is_in_range(uint8_t value)
+{
+    return (value <= 15u);
+}
+
+bool can_db_diagnostics2_fault_page_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 15.0));
+}
+
+bool can_db_diagnostics2_more_faults_is_in_range(uint64_t value)
+{
+    return (value <= 1099511627775ull);
+}
+
+bool can_db_diagnostics2_more_faults_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 1099511627775.0));
+}
+
+int can_db_boot_refusal_pack(
+    uint8_t *dst_p,
+    const struct can_db_boot_refusal_t *src_p,
+    size_t size)
+{
+    if (size < 4u) {
+        return (-EINVAL);
+    }
+
+    memset(&dst_p[0], 0, 4);
+
+    dst_p[0] |= pack_left_shift_u8(src_p->boot_refusal_crc, 0u, 0xffu);
+    dst_p[1] |= pack_left_shift_u8(src_p->boot_refusal_counter, 0u, 0x0fu);
+    dst_p[1] |= pack_left_shift_u8(src_p->refused_part, 4u, 0xf0u);
+    dst_p[2] |= pack_left_shift_u8(src_p->failed_check, 0u, 0xffu);
+
+    return (4);
+}
+
+int can_db_boot_refusal_unpack(
+    struct can_db_boot_refusal_t *dst_p,
+    const uint8_t *src_p,
+    size_t size)
+{
+    if (size < 4u) {
+        return (-EINVAL);
+    }
+
+    dst_p->boot_refusal_crc = unpack_right_shift_u8(src_p[0], 0u, 0xffu);
+    dst_p->boot_refusal_counter = unpack_right_shift_u8(src_p[1], 0u, 0x0fu);
+    dst_p->refused_part = unpack_right_shift_u8(src_p[1], 4u, 0xf0u);
+    dst_p->failed_check = unpack_right_shift_u8(src_p[2], 0u, 0xffu);
+
+    return (0);
+}
+
+int can_db_boot_refusal_init(struct can_db_boot_refusal_t *msg_p)
+{
+    if (msg_p == NULL) return -1;
+
+    memset(msg_p, 0, sizeof(struct can_db_boot_refusal_t));
+
+    return 0;
+}
+
+bool can_db_boot_refusal_boot_refusal_crc_is_in_range(uint8_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_boot_refusal_boot_refusal_crc_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 255.0));
+}
+
+bool can_db_boot_refusal_boot_refusal_counter_is_in_range(uint8_t value)
+{
+    return (value <= 15u);
+}
+
+bool can_db_boot_refusal_boot_refusal_counter_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 15.0));
+}
+
+bool can_db_boot_refusal_refused_part_is_in_range(uint8_t value)
+{
+    return (value <= 15u);
+}
+
+bool can_db_boot_refusal_refused_part_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 15.0));
+}
+
+bool can_db_boot_refusal_failed_check_is_in_range(uint8_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_boot_refusal_failed_check_is_in_phys_range(double value)
 {
     return ((value >= 0.0) && (value <= 255.0));
 }

@@ -50,6 +50,7 @@ extern "C" {
 #define CAN_DB_CELL_THERMAL_FRAME_ID (0x101u)
 #define CAN_DB_COOLANT_FRAME_ID (0x102u)
 #define CAN_DB_CHARGE_REQUEST_FRAME_ID (0x103u)
+#define CAN_DB_CHARGE_MODE_FRAME_ID (0x104u)
 #define CAN_DB_CHARGE_COMMAND_FRAME_ID (0x180u)
 #define CAN_DB_ESTIMATE_FRAME_ID (0x181u)
 #define CAN_DB_DECISION_FRAME_ID (0x182u)
@@ -57,20 +58,25 @@ extern "C" {
 #define CAN_DB_DIAGNOSTICS_FRAME_ID (0x184u)
 #define CAN_DB_IDENTITY_FRAME_ID (0x185u)
 #define CAN_DB_NETWORK_DIAGNOSTICS_FRAME_ID (0x186u)
+#define CAN_DB_DIAGNOSTICS2_FRAME_ID (0x187u)
+#define CAN_DB_BOOT_REFUSAL_FRAME_ID (0x188u)
 
 /* Frame lengths in bytes. */
 #define CAN_DB_SYNC_LENGTH (0u)
 #define CAN_DB_CELL_ELECTRICAL_LENGTH (6u)
 #define CAN_DB_CELL_THERMAL_LENGTH (6u)
 #define CAN_DB_COOLANT_LENGTH (4u)
-#define CAN_DB_CHARGE_REQUEST_LENGTH (6u)
-#define CAN_DB_CHARGE_COMMAND_LENGTH (4u)
+#define CAN_DB_CHARGE_REQUEST_LENGTH (7u)
+#define CAN_DB_CHARGE_MODE_LENGTH (4u)
+#define CAN_DB_CHARGE_COMMAND_LENGTH (5u)
 #define CAN_DB_ESTIMATE_LENGTH (8u)
-#define CAN_DB_DECISION_LENGTH (7u)
+#define CAN_DB_DECISION_LENGTH (8u)
 #define CAN_DB_DECISION_MARGINS_LENGTH (8u)
 #define CAN_DB_DIAGNOSTICS_LENGTH (8u)
 #define CAN_DB_IDENTITY_LENGTH (8u)
 #define CAN_DB_NETWORK_DIAGNOSTICS_LENGTH (8u)
+#define CAN_DB_DIAGNOSTICS2_LENGTH (7u)
+#define CAN_DB_BOOT_REFUSAL_LENGTH (4u)
 
 /* Extended or standard frame types. */
 #define CAN_DB_SYNC_IS_EXTENDED (0)
@@ -78,6 +84,7 @@ extern "C" {
 #define CAN_DB_CELL_THERMAL_IS_EXTENDED (0)
 #define CAN_DB_COOLANT_IS_EXTENDED (0)
 #define CAN_DB_CHARGE_REQUEST_IS_EXTENDED (0)
+#define CAN_DB_CHARGE_MODE_IS_EXTENDED (0)
 #define CAN_DB_CHARGE_COMMAND_IS_EXTENDED (0)
 #define CAN_DB_ESTIMATE_IS_EXTENDED (0)
 #define CAN_DB_DECISION_IS_EXTENDED (0)
@@ -85,6 +92,8 @@ extern "C" {
 #define CAN_DB_DIAGNOSTICS_IS_EXTENDED (0)
 #define CAN_DB_IDENTITY_IS_EXTENDED (0)
 #define CAN_DB_NETWORK_DIAGNOSTICS_IS_EXTENDED (0)
+#define CAN_DB_DIAGNOSTICS2_IS_EXTENDED (0)
+#define CAN_DB_BOOT_REFUSAL_IS_EXTENDED (0)
 
 /* Frame cycle times in milliseconds. */
 #define CAN_DB_SYNC_CYCLE_TIME_MS (100u)
@@ -92,6 +101,7 @@ extern "C" {
 #define CAN_DB_CELL_THERMAL_CYCLE_TIME_MS (100u)
 #define CAN_DB_COOLANT_CYCLE_TIME_MS (100u)
 #define CAN_DB_CHARGE_REQUEST_CYCLE_TIME_MS (100u)
+#define CAN_DB_CHARGE_MODE_CYCLE_TIME_MS (100u)
 #define CAN_DB_CHARGE_COMMAND_CYCLE_TIME_MS (100u)
 #define CAN_DB_ESTIMATE_CYCLE_TIME_MS (100u)
 #define CAN_DB_DECISION_CYCLE_TIME_MS (100u)
@@ -99,11 +109,18 @@ extern "C" {
 #define CAN_DB_DIAGNOSTICS_CYCLE_TIME_MS (100u)
 #define CAN_DB_IDENTITY_CYCLE_TIME_MS (1000u)
 #define CAN_DB_NETWORK_DIAGNOSTICS_CYCLE_TIME_MS (500u)
+#define CAN_DB_DIAGNOSTICS2_CYCLE_TIME_MS (500u)
+#define CAN_DB_BOOT_REFUSAL_CYCLE_TIME_MS (100u)
 
 /* Signal choices. */
 #define CAN_DB_CHARGE_REQUEST_REQUEST_OFF_CHOICE (0u)
 #define CAN_DB_CHARGE_REQUEST_REQUEST_CHARGE_CHOICE (1u)
 #define CAN_DB_CHARGE_REQUEST_REQUEST_NOT_AVAILABLE_CHOICE (15u)
+
+#define CAN_DB_CHARGE_MODE_MODE_FASTEST_CHOICE (0u)
+#define CAN_DB_CHARGE_MODE_MODE_BY_TIME_CHOICE (1u)
+#define CAN_DB_CHARGE_MODE_MODE_FIXED_CHOICE (2u)
+#define CAN_DB_CHARGE_MODE_MODE_NOT_AVAILABLE_CHOICE (15u)
 
 #define CAN_DB_CHARGE_COMMAND_COMMAND_STATE_INIT_CHOICE (0u)
 #define CAN_DB_CHARGE_COMMAND_COMMAND_STATE_STANDBY_CHOICE (1u)
@@ -159,11 +176,29 @@ extern "C" {
 #define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_MESSAGE_CELL_THERMAL_CHOICE (1u)
 #define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_MESSAGE_COOLANT_CHOICE (2u)
 #define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_MESSAGE_CHARGE_REQUEST_CHOICE (3u)
+#define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_MESSAGE_CHARGE_MODE_CHOICE (4u)
 
 #define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_STATE_NO_DATA_CHOICE (0u)
 #define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_STATE_INIT_CHOICE (1u)
 #define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_STATE_VALID_CHOICE (2u)
 #define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_STATE_INVALID_CHOICE (3u)
+
+#define CAN_DB_DIAGNOSTICS2_FAULT_PAGE_ACTIVE_CHOICE (0u)
+#define CAN_DB_DIAGNOSTICS2_FAULT_PAGE_LATCHED_CHOICE (1u)
+
+#define CAN_DB_BOOT_REFUSAL_REFUSED_PART_APPLICATION_CHOICE (1u)
+#define CAN_DB_BOOT_REFUSAL_REFUSED_PART_CALIBRATION_CHOICE (2u)
+#define CAN_DB_BOOT_REFUSAL_REFUSED_PART_BOOT_STAGE_CHOICE (3u)
+
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_NO_MAGIC_CHOICE (1u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_WRONG_LENGTH_CHOICE (2u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_WRONG_CRC_CHOICE (3u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_WRONG_HEADER_LAYOUT_CHOICE (4u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_WRONG_TARGET_CHOICE (5u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_WRONG_VECTORS_CHOICE (6u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_WRONG_CALIBRATION_LAYOUT_CHOICE (7u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_WRONG_FIRMWARE_VERSION_CHOICE (8u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_WRONG_CONTENT_CHOICE (9u)
 
 /* Frame Names. */
 #define CAN_DB_SYNC_NAME "SYNC"
@@ -171,6 +206,7 @@ extern "C" {
 #define CAN_DB_CELL_THERMAL_NAME "CellThermal"
 #define CAN_DB_COOLANT_NAME "Coolant"
 #define CAN_DB_CHARGE_REQUEST_NAME "ChargeRequest"
+#define CAN_DB_CHARGE_MODE_NAME "ChargeMode"
 #define CAN_DB_CHARGE_COMMAND_NAME "ChargeCommand"
 #define CAN_DB_ESTIMATE_NAME "Estimate"
 #define CAN_DB_DECISION_NAME "Decision"
@@ -178,6 +214,8 @@ extern "C" {
 #define CAN_DB_DIAGNOSTICS_NAME "Diagnostics"
 #define CAN_DB_IDENTITY_NAME "Identity"
 #define CAN_DB_NETWORK_DIAGNOSTICS_NAME "NetworkDiagnostics"
+#define CAN_DB_DIAGNOSTICS2_NAME "Diagnostics2"
+#define CAN_DB_BOOT_REFUSAL_NAME "BootRefusal"
 
 /* Signal Names. */
 #define CAN_DB_CELL_ELECTRICAL_CELL_ELECTRICAL_CRC_NAME "CellElectricalCrc"
@@ -196,6 +234,10 @@ extern "C" {
 #define CAN_DB_CHARGE_REQUEST_REQUEST_NAME "Request"
 #define CAN_DB_CHARGE_REQUEST_REFERENCE_CURRENT_NAME "ReferenceCurrent"
 #define CAN_DB_CHARGE_REQUEST_PLUG_IN_STATE_OF_CHARGE_NAME "PlugInStateOfCharge"
+#define CAN_DB_CHARGE_MODE_CHARGE_MODE_CRC_NAME "ChargeModeCrc"
+#define CAN_DB_CHARGE_MODE_CHARGE_MODE_COUNTER_NAME "ChargeModeCounter"
+#define CAN_DB_CHARGE_MODE_MODE_NAME "Mode"
+#define CAN_DB_CHARGE_MODE_TIME_TO_FULL_NAME "TimeToFull"
 #define CAN_DB_CHARGE_COMMAND_CHARGE_COMMAND_CRC_NAME "ChargeCommandCrc"
 #define CAN_DB_CHARGE_COMMAND_CHARGE_COMMAND_COUNTER_NAME "ChargeCommandCounter"
 #define CAN_DB_CHARGE_COMMAND_COMMAND_CURRENT_NAME "CommandCurrent"
@@ -227,6 +269,7 @@ extern "C" {
 #define CAN_DB_IDENTITY_MODEL_HASH_NAME "ModelHash"
 #define CAN_DB_IDENTITY_PRESET_HASH_NAME "PresetHash"
 #define CAN_DB_IDENTITY_FIRMWARE_VERSION_NAME "FirmwareVersion"
+#define CAN_DB_IDENTITY_NETWORK_VERSION_NAME "NetworkVersion"
 #define CAN_DB_NETWORK_DIAGNOSTICS_NETWORK_DIAGNOSTICS_CRC_NAME "NetworkDiagnosticsCrc"
 #define CAN_DB_NETWORK_DIAGNOSTICS_NETWORK_DIAGNOSTICS_COUNTER_NAME "NetworkDiagnosticsCounter"
 #define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_MESSAGE_NAME "ReportedMessage"
@@ -236,6 +279,14 @@ extern "C" {
 #define CAN_DB_NETWORK_DIAGNOSTICS_REPEATED_FRAMES_NAME "RepeatedFrames"
 #define CAN_DB_NETWORK_DIAGNOSTICS_LOST_FRAMES_NAME "LostFrames"
 #define CAN_DB_NETWORK_DIAGNOSTICS_REORDERED_FRAMES_NAME "ReorderedFrames"
+#define CAN_DB_DIAGNOSTICS2_DIAGNOSTICS2_CRC_NAME "Diagnostics2Crc"
+#define CAN_DB_DIAGNOSTICS2_DIAGNOSTICS2_COUNTER_NAME "Diagnostics2Counter"
+#define CAN_DB_DIAGNOSTICS2_FAULT_PAGE_NAME "FaultPage"
+#define CAN_DB_DIAGNOSTICS2_MORE_FAULTS_NAME "MoreFaults"
+#define CAN_DB_BOOT_REFUSAL_BOOT_REFUSAL_CRC_NAME "BootRefusalCrc"
+#define CAN_DB_BOOT_REFUSAL_BOOT_REFUSAL_COUNTER_NAME "BootRefusalCounter"
+#define CAN_DB_BOOT_REFUSAL_REFUSED_PART_NAME "RefusedPart"
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_NAME "FailedCheck"
 
 /**
  * Signals in message SYNC.
@@ -274,11 +325,11 @@ struct can_db_cell_electrical_t {
     uint8_t cell_electrical_counter;
 
     /**
-     * Range: 0..65533 (-65..66.066 A)
+     * Range: 0..1048573 (-1048.576..1048.57 A)
      * Scale: 0.002
-     * Offset: -65
+     * Offset: -1048.576
      */
-    uint16_t current;
+    uint32_t current;
 
     /**
      * Range: 0..65533 (0..6.5533 V)
@@ -385,11 +436,11 @@ struct can_db_charge_request_t {
     uint8_t request;
 
     /**
-     * Range: 0..65533 (-65..66.066 A)
+     * Range: 0..1048573 (-1048.576..1048.57 A)
      * Scale: 0.002
-     * Offset: -65
+     * Offset: -1048.576
      */
-    uint16_t reference_current;
+    uint32_t reference_current;
 
     /**
      * Range: 0..65533 (0..1.31066 1)
@@ -397,6 +448,43 @@ struct can_db_charge_request_t {
      * Offset: 0
      */
     uint16_t plug_in_state_of_charge;
+};
+
+/**
+ * Signals in message ChargeMode.
+ *
+ * How the charge is to be made; a charger that does not care leaves it out. What came last holds as long as the message is valid. Without it, and in mode Fastest, the charge is the fastest that the ECU has. Fixed follows the reference current. A mode that the ECU does not have is an invalid request, as ByTime is now.
+ *
+ * All signal values are as on the CAN bus.
+ */
+struct can_db_charge_mode_t {
+    /**
+     * Range: 0..255 (0..255 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t charge_mode_crc;
+
+    /**
+     * Range: 0..15 (0..15 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t charge_mode_counter;
+
+    /**
+     * Range: 0..15 (0..15 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t mode;
+
+    /**
+     * Range: 0..65533 (0..65533 s)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint16_t time_to_full;
 };
 
 /**
@@ -422,11 +510,11 @@ struct can_db_charge_command_t {
     uint8_t charge_command_counter;
 
     /**
-     * Range: 0..65533 (-65..66.066 A)
+     * Range: 0..1048573 (-1048.576..1048.57 A)
      * Scale: 0.002
-     * Offset: -65
+     * Offset: -1048.576
      */
-    uint16_t command_current;
+    uint32_t command_current;
 
     /**
      * Range: 0..15 (0..15 -)
@@ -524,18 +612,18 @@ struct can_db_decision_t {
     uint8_t feasible;
 
     /**
-     * Range: 0..65533 (-65..66.066 A)
+     * Range: 0..1048573 (-1048.576..1048.57 A)
      * Scale: 0.002
-     * Offset: -65
+     * Offset: -1048.576
      */
-    uint16_t lower_current;
+    uint32_t lower_current;
 
     /**
-     * Range: 0..65533 (-65..66.066 A)
+     * Range: 0..1048573 (-1048.576..1048.57 A)
      * Scale: 0.002
-     * Offset: -65
+     * Offset: -1048.576
      */
-    uint16_t upper_current;
+    uint32_t upper_current;
 };
 
 /**
@@ -592,7 +680,7 @@ struct can_db_decision_margins_t {
 /**
  * Signals in message Diagnostics.
  *
- * State and fault bits; bit n is fault n of monitor.h.
+ * State and fault bits; bit n is fault n of monitor.h, up to fault 19.
  *
  * All signal values are as on the CAN bus.
  */
@@ -643,7 +731,7 @@ struct can_db_diagnostics_t {
 /**
  * Signals in message Identity.
  *
- * First bits of the model's and the preset's SHA-256, and the firmware version.
+ * First bits of the model's and the preset's SHA-256, the version of the firmware (0: its boot stage), and that of this database, 0 in version 1.
  *
  * All signal values are as on the CAN bus.
  */
@@ -663,17 +751,24 @@ struct can_db_identity_t {
     uint16_t preset_hash;
 
     /**
-     * Range: 0..65535 (0..65535 -)
+     * Range: 0..255 (0..255 -)
      * Scale: 1
      * Offset: 0
      */
-    uint16_t firmware_version;
+    uint8_t firmware_version;
+
+    /**
+     * Range: 0..255 (0..255 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t network_version;
 };
 
 /**
  * Signals in message NetworkDiagnostics.
  *
- * How one of the messages to the ECU fared since start-up; the four take turns. A count of 255 means 255 or more.
+ * How one of the messages to the ECU fared since start-up; all take turns. A count of 255 means 255 or more.
  *
  * All signal values are as on the CAN bus.
  */
@@ -746,6 +841,80 @@ struct can_db_network_diagnostics_t {
      * Offset: 0
      */
     uint8_t reordered_frames;
+};
+
+/**
+ * Signals in message Diagnostics2.
+ *
+ * The same as Diagnostics for later faults: bit n is fault n + 20 of monitor.h. Active and latched ones take turns.
+ *
+ * All signal values are as on the CAN bus.
+ */
+struct can_db_diagnostics2_t {
+    /**
+     * Range: 0..255 (0..255 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t diagnostics2_crc;
+
+    /**
+     * Range: 0..15 (0..15 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t diagnostics2_counter;
+
+    /**
+     * Range: 0..15 (0..15 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t fault_page;
+
+    /**
+     * Range: 0..1099511627775 (0..1099511627775 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint64_t more_faults;
+};
+
+/**
+ * Signals in message BootRefusal.
+ *
+ * Sent by the boot stage alone: why it does not start the application.
+ *
+ * All signal values are as on the CAN bus.
+ */
+struct can_db_boot_refusal_t {
+    /**
+     * Range: 0..255 (0..255 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t boot_refusal_crc;
+
+    /**
+     * Range: 0..15 (0..15 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t boot_refusal_counter;
+
+    /**
+     * Range: 0..15 (0..15 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t refused_part;
+
+    /**
+     * Range: 0..255 (0..255 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t failed_check;
 };
 
 /**
@@ -873,7 +1042,7 @@ bool can_db_cell_electrical_cell_electrical_counter_is_in_phys_range(double valu
  *
  * @return true if in range, false otherwise.
  */
-bool can_db_cell_electrical_current_is_in_range(uint16_t value);
+bool can_db_cell_electrical_current_is_in_range(uint32_t value);
 
 /**
  * Check that given physical value is in allowed range before encoding.
@@ -1248,7 +1417,7 @@ bool can_db_charge_request_request_is_in_phys_range(double value);
  *
  * @return true if in range, false otherwise.
  */
-bool can_db_charge_request_reference_current_is_in_range(uint16_t value);
+bool can_db_charge_request_reference_current_is_in_range(uint32_t value);
 
 /**
  * Check that given physical value is in allowed range before encoding.
@@ -1284,6 +1453,131 @@ bool can_db_charge_request_plug_in_state_of_charge_is_in_range(uint16_t value);
  * @return true if in range, false otherwise.
  */
 bool can_db_charge_request_plug_in_state_of_charge_is_in_phys_range(double value);
+
+/**
+ * Pack message ChargeMode.
+ *
+ * @param[out] dst_p Buffer to pack the message into.
+ * @param[in] src_p Data to pack.
+ * @param[in] size Size of dst_p.
+ *
+ * @return Size of packed data, or negative error code.
+ */
+int can_db_charge_mode_pack(
+    uint8_t *dst_p,
+    const struct can_db_charge_mode_t *src_p,
+    size_t size);
+
+/**
+ * Unpack message ChargeMode.
+ *
+ * @param[out] dst_p Object to unpack the message into.
+ * @param[in] src_p Message to unpack.
+ * @param[in] size Size of src_p.
+ *
+ * @return zero(0) or negative error code.
+ */
+int can_db_charge_mode_unpack(
+    struct can_db_charge_mode_t *dst_p,
+    const uint8_t *src_p,
+    size_t size);
+
+/**
+ * Init message fields to default values from ChargeMode.
+ *
+ * @param[in] msg_p Message to init.
+ *
+ * @return zero(0) on success or (-1) in case of nullptr argument.
+ */
+int can_db_charge_mode_init(struct can_db_charge_mode_t *msg_p);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_charge_mode_charge_mode_crc_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_charge_mode_charge_mode_crc_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_charge_mode_charge_mode_counter_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_charge_mode_charge_mode_counter_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_charge_mode_mode_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_charge_mode_mode_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_charge_mode_time_to_full_is_in_range(uint16_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_charge_mode_time_to_full_is_in_phys_range(double value);
 
 /**
  * Pack message ChargeCommand.
@@ -1373,7 +1667,7 @@ bool can_db_charge_command_charge_command_counter_is_in_phys_range(double value)
  *
  * @return true if in range, false otherwise.
  */
-bool can_db_charge_command_command_current_is_in_range(uint16_t value);
+bool can_db_charge_command_command_current_is_in_range(uint32_t value);
 
 /**
  * Check that given physical value is in allowed range before encoding.
@@ -1711,7 +2005,7 @@ bool can_db_decision_feasible_is_in_phys_range(double value);
  *
  * @return true if in range, false otherwise.
  */
-bool can_db_decision_lower_current_is_in_range(uint16_t value);
+bool can_db_decision_lower_current_is_in_range(uint32_t value);
 
 /**
  * Check that given physical value is in allowed range before encoding.
@@ -1733,7 +2027,7 @@ bool can_db_decision_lower_current_is_in_phys_range(double value);
  *
  * @return true if in range, false otherwise.
  */
-bool can_db_decision_upper_current_is_in_range(uint16_t value);
+bool can_db_decision_upper_current_is_in_range(uint32_t value);
 
 /**
  * Check that given physical value is in allowed range before encoding.
@@ -2174,7 +2468,7 @@ bool can_db_identity_preset_hash_is_in_phys_range(double value);
  *
  * @return true if in range, false otherwise.
  */
-bool can_db_identity_firmware_version_is_in_range(uint16_t value);
+bool can_db_identity_firmware_version_is_in_range(uint8_t value);
 
 /**
  * Check that given physical value is in allowed range before encoding.
@@ -2188,6 +2482,28 @@ bool can_db_identity_firmware_version_is_in_range(uint16_t value);
  * @return true if in range, false otherwise.
  */
 bool can_db_identity_firmware_version_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_identity_network_version_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_identity_network_version_is_in_phys_range(double value);
 
 /**
  * Pack message NetworkDiagnostics.
@@ -2423,6 +2739,256 @@ bool can_db_network_diagnostics_reordered_frames_is_in_range(uint8_t value);
  * @return true if in range, false otherwise.
  */
 bool can_db_network_diagnostics_reordered_frames_is_in_phys_range(double value);
+
+/**
+ * Pack message Diagnostics2.
+ *
+ * @param[out] dst_p Buffer to pack the message into.
+ * @param[in] src_p Data to pack.
+ * @param[in] size Size of dst_p.
+ *
+ * @return Size of packed data, or negative error code.
+ */
+int can_db_diagnostics2_pack(
+    uint8_t *dst_p,
+    const struct can_db_diagnostics2_t *src_p,
+    size_t size);
+
+/**
+ * Unpack message Diagnostics2.
+ *
+ * @param[out] dst_p Object to unpack the message into.
+ * @param[in] src_p Message to unpack.
+ * @param[in] size Size of src_p.
+ *
+ * @return zero(0) or negative error code.
+ */
+int can_db_diagnostics2_unpack(
+    struct can_db_diagnostics2_t *dst_p,
+    const uint8_t *src_p,
+    size_t size);
+
+/**
+ * Init message fields to default values from Diagnostics2.
+ *
+ * @param[in] msg_p Message to init.
+ *
+ * @return zero(0) on success or (-1) in case of nullptr argument.
+ */
+int can_db_diagnostics2_init(struct can_db_diagnostics2_t *msg_p);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_diagnostics2_diagnostics2_crc_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_diagnostics2_diagnostics2_crc_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_diagnostics2_diagnostics2_counter_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_diagnostics2_diagnostics2_counter_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_diagnostics2_fault_page_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_diagnostics2_fault_page_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_diagnostics2_more_faults_is_in_range(uint64_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_diagnostics2_more_faults_is_in_phys_range(double value);
+
+/**
+ * Pack message BootRefusal.
+ *
+ * @param[out] dst_p Buffer to pack the message into.
+ * @param[in] src_p Data to pack.
+ * @param[in] size Size of dst_p.
+ *
+ * @return Size of packed data, or negative error code.
+ */
+int can_db_boot_refusal_pack(
+    uint8_t *dst_p,
+    const struct can_db_boot_refusal_t *src_p,
+    size_t size);
+
+/**
+ * Unpack message BootRefusal.
+ *
+ * @param[out] dst_p Object to unpack the message into.
+ * @param[in] src_p Message to unpack.
+ * @param[in] size Size of src_p.
+ *
+ * @return zero(0) or negative error code.
+ */
+int can_db_boot_refusal_unpack(
+    struct can_db_boot_refusal_t *dst_p,
+    const uint8_t *src_p,
+    size_t size);
+
+/**
+ * Init message fields to default values from BootRefusal.
+ *
+ * @param[in] msg_p Message to init.
+ *
+ * @return zero(0) on success or (-1) in case of nullptr argument.
+ */
+int can_db_boot_refusal_init(struct can_db_boot_refusal_t *msg_p);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_boot_refusal_boot_refusal_crc_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_boot_refusal_boot_refusal_crc_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_boot_refusal_boot_refusal_counter_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_boot_refusal_boot_refusal_counter_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_boot_refusal_refused_part_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_boot_refusal_refused_part_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_boot_refusal_failed_check_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_boot_refusal_failed_check_is_in_phys_range(double value);
 
 
 #ifdef __cplusplus

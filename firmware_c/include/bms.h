@@ -24,8 +24,8 @@
 extern "C" {
 #endif
 
-#define BMS_FIRMWARE_VERSION 2
-#define BMS_TRANSMITTED_MESSAGES 7
+#define BMS_FIRMWARE_VERSION 3
+#define BMS_TRANSMITTED_MESSAGES 8
 
 typedef enum {
     BMS_INIT = 0,

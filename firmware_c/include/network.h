@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-#define NETWORK_MESSAGES 4
+#define NETWORK_MESSAGES 5
 
 /* Index: order of CAN_RECEIVED. All zero before the first frame. */
 typedef struct {
@@ -29,7 +29,7 @@ void network_receive(network_t *network, const can_frame_t *frame,
 /* Ends a period: judges every message. */
 void network_step(network_t *network);
 
-/* Whether every message has come often enough to be trusted. */
+/* Whether every message that has to come has done so often enough to be trusted. */
 bool network_is_valid(const network_t *network);
 
 #ifdef __cplusplus

@@ -5,13 +5,14 @@
 
 #include "can_catalog.h"
 #include "numeric.h"
+#include "request.h"
 
 /* Periods that the other nodes have to come up before their silence is a fault. */
 #define START_UP_PERIODS 50u
 
 typedef char transmitted_messages_agree[(BMS_TRANSMITTED_MESSAGES == CAN_TRANSMITTED_COUNT) ? 1
                                                                                            : -1];
-typedef char faults_fit_into_their_signal[(FAULT_COUNT <= 20) ? 1 : -1];
+typedef char faults_fit_into_their_mask[(FAULT_COUNT <= 32) ? 1 : -1];
 
 static const rcbf_decision_t NO_DECISION = {
     0.0f, false, RCBF_INVALID, NAN, NAN, { NAN, NAN, NAN, NAN }
@@ -35,6 +36,12 @@ static bool is_charging(const bms_t *bms)
 static bool is_usable(const bms_t *bms, uint32_t message)
 {
     return bms->network.is_usable[message];
+}
+
+/* What a message said last still counts, though no frame came in this period. */
+static bool is_valid(const bms_t *bms, uint32_t message)
+{
+    return bms->network.receivers[message].state == E2E_VALID;
 }
 
 void bms_init(bms_t *bms, const bms_config_t *config)
@@ -64,18 +71,9 @@ static uint32_t symptoms_of_missing_messages(const bms_t *bms)
     };
     uint32_t symptoms = bit_if(bms->network.is_disturbed, FAULT_CORRUPTED_FRAMES);
     for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
-        symptoms |= bit_if(!is_usable(bms, i), MISSING[i]);
+        symptoms |= bit_if(!CAN_RECEIVED[i].is_optional && !is_usable(bms, i), MISSING[i]);
     }
     return symptoms;
-}
-
-static bool request_is_valid(const bms_t *bms)
-{
-    const codec_measurement_t *m = &bms->measurement;
-    const bool start_is_known =
-        (m->plug_in_soc >= 0.0f) && (m->plug_in_soc <= bms->calibration->rcbf.max_soc);
-    return (m->request == REQUEST_OFF) ||
-           ((m->request == REQUEST_CHARGE) && (m->reference_current_A <= 0.0f) && start_is_known);
 }
 
 static uint32_t symptoms_of_readings(const bms_t *bms)
@@ -106,7 +104,9 @@ static uint32_t symptoms_of_readings(const bms_t *bms)
                   FAULT_COOLANT_RANGE) |
            bit_if(coolant && is_outside(m->cooling_power_W, &limits->cooling_power_W),
                   FAULT_COOLING_RANGE) |
-           bit_if(is_usable(bms, CAN_RECEIVED_CHARGE_REQUEST) && !request_is_valid(bms),
+           bit_if(is_usable(bms, CAN_RECEIVED_CHARGE_REQUEST) &&
+                      !request_is_valid(m, is_valid(bms, CAN_RECEIVED_CHARGE_MODE),
+                                        cell->max_soc),
                   FAULT_REQUEST_INVALID) |
            bit_if(electrical && thermal && coolant && !bms->estimate.in_domain,
                   FAULT_OUT_OF_DOMAIN) |
@@ -270,6 +270,8 @@ static void queue_frames(bms_t *bms)
     const uint32_t turn =
         bms->periods / CAN_TRANSMITTED[CAN_TRANSMITTED_NETWORK_DIAGNOSTICS].every_periods;
     const uint8_t reported = (uint8_t)(turn % CAN_RECEIVED_COUNT);
+    const uint32_t page_turn =
+        bms->periods / CAN_TRANSMITTED[CAN_TRANSMITTED_DIAGNOSTICS2].every_periods;
     const codec_report_t report = {
         .command_A = bms->command_A,
         .state = (uint8_t)bms->state,
@@ -288,6 +290,7 @@ static void queue_frames(bms_t *bms)
         .first_fault = bms->monitor.first,
         .active_faults = bms->monitor.active,
         .latched_faults = bms->monitor.latched,
+        .fault_page = (uint8_t)(page_turn % 2u),
         .reported_message = reported,
         .reported_state = (uint8_t)bms->network.receivers[reported].state,
         .reported_counts = bms->network.receivers[reported].counts,

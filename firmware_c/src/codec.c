@@ -8,36 +8,48 @@
 
 /* Share of a step by which float32 may miss a value that lies exactly on a step. */
 #define STEP_TOLERANCE 0.02f
+/* More than any signal has; float32 holds every whole number up to there. */
+#define MOST_STEPS 16777216.0f
 /* All ones of the fields that carry a code. */
 #define TWO_BITS 3u
 #define FOUR_BITS 15u
+#define FIRST_FAULTS (((uint32_t)1u << CODEC_FIRST_FAULTS) - 1u)
 
-uint16_t codec_encode(const codec_signal_t *signal, float value, codec_rounding_t rounding)
+uint32_t codec_encode(const codec_signal_t *signal, float value, codec_rounding_t rounding)
 {
     if (!numeric_is_finite(value)) {
-        return (uint16_t)(signal->raw_max + 2u);
+        return signal->raw_max + 2u;
     }
-    float up = 0.5f;
-    if (rounding == CODEC_TOWARDS_ZERO) {
-        up = (value < 0.0f) ? (1.0f - STEP_TOLERANCE) : STEP_TOLERANCE;
+    const float up = (rounding == CODEC_TOWARDS_ZERO) ? STEP_TOLERANCE : 0.5f;
+    /* Rounded before the offset comes on top, in which float32 would lose parts of a step. */
+    const int32_t steps =
+        (int32_t)numeric_clamp(numeric_abs(value) / signal->scale + up, 0.0f, MOST_STEPS);
+    const int32_t raw = ((value < 0.0f) ? -steps : steps) - signal->offset_steps;
+    if (raw < 0) {
+        return 0u;
     }
-    const float steps = (value - signal->offset) / signal->scale + up;
-    return (uint16_t)numeric_clamp(steps, 0.0f, (float)signal->raw_max);
+    return ((uint32_t)raw < signal->raw_max) ? (uint32_t)raw : signal->raw_max;
 }
 
-float codec_decode(const codec_signal_t *signal, uint16_t raw)
+float codec_decode(const codec_signal_t *signal, uint32_t raw)
 {
-    return (raw > signal->raw_max) ? NAN : (signal->offset + signal->scale * (float)raw);
+    const float steps = (float)((int32_t)raw + signal->offset_steps);
+    return (raw > signal->raw_max) ? NAN : (signal->scale * steps);
 }
 
-static float decode(uint32_t signal, uint16_t raw)
+static float decode(uint32_t signal, uint32_t raw)
 {
     return codec_decode(&CAN_SIGNALS[signal], raw);
 }
 
-static uint16_t encode(uint32_t signal, float value)
+static uint32_t encode_wide(uint32_t signal, float value)
 {
     return codec_encode(&CAN_SIGNALS[signal], value, CODEC_NEAREST);
+}
+
+static uint16_t encode(uint32_t signal, float value)
+{
+    return (uint16_t)encode_wide(signal, value);
 }
 
 /* A code that its field cannot hold becomes all ones, which says "not available". */
@@ -81,6 +93,13 @@ void codec_read(uint32_t index, const uint8_t *data, codec_measurement_t *measur
             decode(CAN_SIGNAL_PLUG_IN_STATE_OF_CHARGE, message.plug_in_state_of_charge);
         break;
     }
+    case CAN_RECEIVED_CHARGE_MODE: {
+        struct can_db_charge_mode_t message;
+        (void)can_db_charge_mode_unpack(&message, data, CAN_DB_CHARGE_MODE_LENGTH);
+        measurement->mode = message.mode;
+        measurement->time_to_full_s = decode(CAN_SIGNAL_TIME_TO_FULL, message.time_to_full);
+        break;
+    }
     default:
         break;
     }
@@ -102,8 +121,8 @@ static void write_decision(const codec_report_t *report, uint8_t *data)
     const struct can_db_decision_t message = {
         .active_constraint = code(report->active_constraint, FOUR_BITS),
         .feasible = code(report->feasible, TWO_BITS),
-        .lower_current = encode(CAN_SIGNAL_LOWER_CURRENT, report->lower_A),
-        .upper_current = encode(CAN_SIGNAL_UPPER_CURRENT, report->upper_A),
+        .lower_current = encode_wide(CAN_SIGNAL_LOWER_CURRENT, report->lower_A),
+        .upper_current = encode_wide(CAN_SIGNAL_UPPER_CURRENT, report->upper_A),
     };
     (void)can_db_decision_pack(data, &message, CAN_DB_DECISION_LENGTH);
 }
@@ -124,10 +143,21 @@ static void write_diagnostics(const codec_report_t *report, uint8_t *data)
     const struct can_db_diagnostics_t message = {
         .diagnostic_state = code(report->state, FOUR_BITS),
         .first_fault = report->first_fault,
-        .active_faults = report->active_faults,
-        .latched_faults = report->latched_faults,
+        .active_faults = report->active_faults & FIRST_FAULTS,
+        .latched_faults = report->latched_faults & FIRST_FAULTS,
     };
     (void)can_db_diagnostics_pack(data, &message, CAN_DB_DIAGNOSTICS_LENGTH);
+}
+
+static void write_more_diagnostics(const codec_report_t *report, uint8_t *data)
+{
+    const uint32_t faults = (report->fault_page == FAULT_PAGE_ACTIVE) ? report->active_faults
+                                                                     : report->latched_faults;
+    const struct can_db_diagnostics2_t message = {
+        .fault_page = code(report->fault_page, FOUR_BITS),
+        .more_faults = faults >> CODEC_FIRST_FAULTS,
+    };
+    (void)can_db_diagnostics2_pack(data, &message, CAN_DB_DIAGNOSTICS2_LENGTH);
 }
 
 static void write_network_diagnostics(const codec_report_t *report, uint8_t *data)
@@ -150,6 +180,7 @@ static void write_identity(const codec_report_t *report, uint8_t *data)
         .model_hash = report->model_hash,
         .preset_hash = report->preset_hash,
         .firmware_version = report->firmware_version,
+        .network_version = CAN_NETWORK_VERSION,
     };
     (void)can_db_identity_pack(data, &message, CAN_DB_IDENTITY_LENGTH);
 }
@@ -172,6 +203,7 @@ void codec_write(uint32_t index, const codec_report_t *report, can_frame_t *fram
         [CAN_TRANSMITTED_DECISION_MARGINS] = write_margins,
         [CAN_TRANSMITTED_DIAGNOSTICS] = write_diagnostics,
         [CAN_TRANSMITTED_NETWORK_DIAGNOSTICS] = write_network_diagnostics,
+        [CAN_TRANSMITTED_DIAGNOSTICS2] = write_more_diagnostics,
         [CAN_TRANSMITTED_IDENTITY] = write_identity,
         [CAN_TRANSMITTED_CHARGE_COMMAND] = write_command,
     };

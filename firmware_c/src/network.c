@@ -32,7 +32,8 @@ bool network_is_valid(const network_t *network)
 {
     bool is_valid = true;
     for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
-        is_valid = is_valid && (network->receivers[i].state == E2E_VALID);
+        is_valid = is_valid && (CAN_RECEIVED[i].is_optional ||
+                                (network->receivers[i].state == E2E_VALID));
     }
     return is_valid;
 }

@@ -22,11 +22,11 @@ Values = dict[str, "float | None"]
 
 @dataclass(frozen=True)
 class _Signal:
-    """Scaling of a signal, with its range in raw units."""
+    """Scaling of a signal, with its offset and range in steps; so 0 and what is read are exact."""
 
     name: str
     scale: float
-    offset: float
+    offset_steps: int
     lowest: int
     highest: int
     all_ones: int
@@ -34,13 +34,13 @@ class _Signal:
     def raw(self, value: float | None) -> int:
         if value is None or math.isnan(value):
             return self.all_ones
-        limited = min(max((value - self.offset) / self.scale, self.lowest), self.highest)
-        return round(limited)
+        steps = value / self.scale - self.offset_steps
+        return round(min(max(steps, self.lowest), self.highest))
 
     def physical(self, raw: int) -> float | None:
         if not self.lowest <= raw <= self.highest:
             return None
-        return raw * self.scale + self.offset
+        return (raw + self.offset_steps) * self.scale
 
 
 class MessageCodec:
@@ -132,7 +132,7 @@ def _signal(signal: Any) -> _Signal:
     return _Signal(
         name=signal.name,
         scale=signal.scale,
-        offset=signal.offset,
+        offset_steps=round(signal.offset / signal.scale),
         lowest=round((signal.minimum - signal.offset) / signal.scale),
         highest=round((signal.maximum - signal.offset) / signal.scale),
         all_ones=(1 << signal.length) - 1,

@@ -9,11 +9,12 @@ from itertools import product
 import numpy as np
 import pytest
 
-from bms.barrier import BusQuantisation, barrier_constants, sampling_margins
+from bms.barrier import barrier_constants, sampling_margins
 from bms.barrier.constraints import charging_current_A, left_hand_sides
 from bms.barrier.rates import Weights, heat_range_W, largest_rate
 from bms.barrier.readings import soc_error_bound
 from bms.barrier.rounding import ROUNDINGS, UNIT, rounding_allowances
+from bms.bus_signals import BusQuantisation
 from bms.cell import CellState, Disturbance, integrate_step, rates, terminal_voltage_V
 from bms.presets import load_preset, preset_names
 from bms.presets.schema import Uncertainty

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from bms.barrier import BusQuantisation
 from bms.bounds.readings import measurement_error_K
+from bms.bus_signals import BusQuantisation
 from bms.data.datasets import simulated_split
 from bms.data.simulate import Samples, joined
 from bms.errors import InputError

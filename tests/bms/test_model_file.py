@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import sys
 
 import pytest
 
@@ -14,7 +15,9 @@ from bms.bounds.record import (
     WorstCase,
     WorstProfile,
 )
-from bms.errors import InputError
+from bms.cell.parameters import OpenCircuitVoltage
+from bms.data.datasets import simulated_split
+from bms.errors import InputError, ModelMismatchError
 from bms.kan.accuracy import ErrorFigures
 from bms.kan.settings import TrainingSettings
 from bms.model.model_file import (
@@ -24,8 +27,12 @@ from bms.model.model_file import (
     load_model,
     load_shipped_model,
     save_model,
+    shipped_model_path,
 )
+from bms.model.pair import check_pair
+from bms.model.restamp import main, restamped
 from bms.presets import load_preset, preset_names
+from bms.presets.schema import Sensor
 from tests.bms.kan_samples import random_network
 
 
@@ -173,3 +180,89 @@ def test_shipped_model_reaches_the_papers_rmse_on_unseen_profiles(name):
 def test_preset_without_a_model_is_told_how_to_get_one():
     with pytest.raises(InputError, match="bms train --preset other"):
         load_shipped_model("other")
+
+
+def with_cell(preset, **changes):
+    return dataclasses.replace(preset, cell=dataclasses.replace(preset.cell, **changes))
+
+
+def test_another_open_circuit_voltage_keeps_a_model_and_another_resistance_refuses_it():
+    preset, shipped = load_preset("lin2014"), load_shipped_model("lin2014")
+    check_pair(with_cell(preset, ocv=OpenCircuitVoltage((0.0, 1.0), (3.0, 3.4))), shipped)
+    with pytest.raises(ModelMismatchError, match="another cell"):
+        check_pair(with_cell(preset, core_resistance_K_per_W=1.95), shipped)
+
+
+@pytest.fixture
+def from_another_hashing(tmp_path):
+    """Path of a shipped model as it was when training hashes were made otherwise."""
+    path = tmp_path / "model.json"
+    save_model(dataclasses.replace(load_shipped_model("lin2014"), training_hash="0" * 64), path)
+    return path
+
+
+def restamp(monkeypatch, path):
+    monkeypatch.setattr(sys, "argv", ["restamp", str(path)])
+    main()
+
+
+@pytest.mark.slow
+def test_restamping_makes_a_model_the_shipped_one_again(monkeypatch, from_another_hashing):
+    restamp(monkeypatch, from_another_hashing)
+    assert from_another_hashing.read_bytes() == shipped_model_path("lin2014").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def test_profiles():
+    preset, model = load_preset("lin2014"), load_shipped_model("lin2014")
+    return simulated_split(preset, "test", model.training.settings.seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("changed_error", "changed_search", "noise", "told"),
+    [
+        (1e-4, 0.0, 0.005, "error on test profiles"),
+        (0.0, 1e-5, 0.005, "error that a search finds"),
+        (0.0, 0.0, 0.006, "error bound"),
+    ],
+)
+def test_a_model_of_something_else_is_not_restamped(
+    monkeypatch,
+    capsys,
+    from_another_hashing,
+    test_profiles,
+    changed_error,
+    changed_search,
+    noise,
+    told,
+):
+    """Each of the three figures is looked at; the search, which takes long, gives what it did."""
+    preset, before = load_preset("lin2014"), from_another_hashing.read_bytes()
+    sensors = dataclasses.replace(preset.sensors, current_A=Sensor(0.005, noise, 0.0))
+    recorded = load_shipped_model("lin2014").error_bounds.worst_case
+    searched = dataclasses.replace(recorded, value_K=recorded.value_K + changed_search)
+    profiles = {
+        kind: dataclasses.replace(
+            samples, core_temperature_K=samples.core_temperature_K + changed_error
+        )
+        for kind, samples in test_profiles.items()
+    }
+    for name, result in (
+        ("load_preset", dataclasses.replace(preset, sensors=sensors)),
+        ("simulated_split", profiles),
+        ("worst_case", searched),
+    ):
+        monkeypatch.setattr(f"bms.model.restamp.{name}", lambda *_, result=result: result)
+    with pytest.raises(SystemExit) as stop:
+        restamp(monkeypatch, from_another_hashing)
+    told_line = capsys.readouterr().err
+    assert stop.value.code == 2
+    assert f"model.json: {told}: preset 'lin2014' gives another one" in told_line
+    assert told_line.count("\n") == 1
+    assert from_another_hashing.read_bytes() == before
+
+
+def test_a_model_of_measurements_has_no_training_hash_to_renew(model):
+    with pytest.raises(InputError, match="trained on measurements"):
+        restamped(dataclasses.replace(model, training_hash=None), load_preset("lin2014"))

@@ -16,8 +16,9 @@ from typer import Typer
 from typer.testing import CliRunner
 
 from bms.barrier.margins import decision_allowances
-from bms.barrier.readings import BUS, reading_errors
+from bms.barrier.readings import reading_errors
 from bms.barrier.rounding import ARITHMETIC_ROUNDINGS
+from bms.bus_signals import BUS
 from bms.cell import CellState, Disturbance, integrate_step, rates
 from bms.commands.verify import verify as command
 from bms.firmware import Firmware

@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bms.barrier.margins import charge_taken_up, sampling_margins, strongest_current_A
-from bms.barrier.readings import BUS, soc_error_bound
+from bms.barrier.readings import soc_error_bound
 from bms.barrier.rounding import rounding_allowances
+from bms.bus_signals import BUS
 from bms.firmware import Firmware
 from bms.presets import load_preset, preset_names
 from bms.verification.conditions import firmware_constants

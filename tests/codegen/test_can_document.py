@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
+import cantools.autosar
 import pytest
 
 from bms.firmware._firmware import ffi, lib
@@ -60,6 +62,49 @@ def test_every_fault_has_its_policy_and_a_meaning() -> None:
         assert meaning
         assert at_once == ("yes" if policies[number].stops_at_once else "no")
         assert int(periods) == policies[number].debounce_periods
+
+
+def test_the_document_names_the_version_of_the_database() -> None:
+    version = int(DATABASE.version or 0)
+    assert 1 <= version <= 255, "it has 8 bits in Identity"
+    assert f"\nVersion {version} of the database" in DOCUMENT
+
+
+def test_optional_messages_and_those_of_the_boot_stage_are_told() -> None:
+    directions = {row[1]: row[2] for row in table("# The CAN bus").values()}
+    assert directions["[ChargeMode](#chargemode)"] == "plant to ECU, optional"
+    assert directions["[BootRefusal](#bootrefusal)"] == "ECU to plant, boot stage only"
+    assert sum("," in direction for direction in directions.values()) == 2
+
+
+def test_a_crc_made_by_the_document_alone_is_that_of_the_example_and_of_cantools() -> None:
+    text = DOCUMENT.replace("\n", " ")
+    number = r"0x([0-9A-F]+)"
+    match = re.search(
+        rf"polynomial {number}, start value {number} and final exclusive or {number},", text
+    )
+    assert match
+    width, (polynomial, start, final) = 8, (int(digits, 16) for digits in match.groups())
+
+    def crc(data: bytes) -> int:
+        remainder = start
+        for byte in data:
+            remainder ^= byte
+            for _ in range(width):
+                remainder = remainder << 1 ^ (polynomial if remainder & 0x80 else 0)
+                remainder &= 0xFF
+        return remainder ^ final
+
+    example = re.search(rf"A (\w+) of 0 A .* counter (\d+), .* {number}, is `([0-9a-f ]+)`", text)
+    assert example
+    name, counter, data_id, data = example.groups()
+    payload = bytes.fromhex(data)
+    message = DATABASE.get_message_by_name(name)
+    assert payload[0] == crc(payload[1:] + bytes([int(data_id, 16)]))
+    assert data_ids(message)[int(counter)] == int(data_id, 16)
+    values = message.decode(payload, decode_choices=False)
+    assert values["CommandCurrent"] == 0.0 and values[f"{name}Counter"] == int(counter)
+    assert cantools.autosar.check_profile2_crc(payload, int(data_id, 16))
 
 
 @pytest.mark.parametrize("message", [m for m in MESSAGES if data_ids(m)], ids=lambda m: m.name)

@@ -12,6 +12,9 @@ from codegen.can_database import data_ids, load_database
 
 DATABASE = load_database()
 MEASURED = ("CellElectrical", "CellThermal", "Coolant", "ChargeRequest")
+"""What the ECU has to receive."""
+RECEIVED = (*MEASURED, "ChargeMode")
+"""What it takes, in the order in which it reports how messages fared."""
 READY_PERIODS = 3
 """Good periods that make a message valid."""
 STATES = ("Init", "Standby", "Charging", "Derated", "Complete", "Fault")
@@ -41,11 +44,14 @@ def frame(name: str, counter: int, values: dict[str, Any]) -> tuple[int, bytes]:
 
 @dataclass
 class Bench:
-    """Sends healthy measurements each period unless a test changes, drops or replaces some."""
+    """Sends healthy measurements each period unless a test changes, drops or replaces some.
+
+    ChargeMode, which is optional, comes from the period on in which a test gives a Mode.
+    """
 
     ecu: Ecu = field(default_factory=lambda: Ecu("lin2014"))
     values: dict[str, float] = field(default_factory=lambda: dict(HEALTHY))
-    counters: dict[str, int] = field(default_factory=lambda: dict.fromkeys(MEASURED, 0))
+    counters: dict[str, int] = field(default_factory=lambda: dict.fromkeys(RECEIVED, 0))
     follow_command: bool = True
     answer: dict[str, Any] = field(default_factory=dict)
 
@@ -57,7 +63,7 @@ class Bench:
     ) -> dict[str, Any]:
         """One control period; returns all signals that the ECU sent, by name."""
         self.values.update(changes)
-        for name in MEASURED:
+        for name in RECEIVED if "Mode" in self.values else MEASURED:
             sent = frame(name, self.counters[name], self.values)
             self.counters[name] += 1
             if name in drop:

@@ -11,8 +11,10 @@ from statistics import median
 from typing import Any
 
 import pytest
+from cantools.database.can.c_source import camel_to_snake_case
 
 from bms.firmware._firmware import lib
+from codegen import can_database
 from hil_sim.bus.buses import Frame, open_bus
 from hil_sim.bus.database import load_codecs
 from hil_sim.bus.e2e import Receiver
@@ -34,9 +36,10 @@ from tests.firmware.ports import ROOT, build, image, needs_emulator
 pytestmark = needs_emulator
 
 CODECS = load_codecs()
-SPOKEN = ("Diagnostics", "Identity", "ChargeCommand")
-PARTS = {1: "APPLICATION", 2: "CALIBRATION", 3: "BOOT"}
+SPOKEN = ("Diagnostics", "Identity", "BootRefusal", "ChargeCommand")
+PARTS = ("APPLICATION", "CALIBRATION", "BOOT")
 CALIBRATION_FAULT, FAULT_STATE = 18, 5
+VERSION = can_database.network_version(can_database.load_database())
 SOURCES = [FIRMWARE / "boot" / "refusal.c"]
 SOURCES += [FIRMWARE / "src" / f"{name}.c" for name in ("codec", "e2e")]
 SOURCES += [FIRMWARE / "generated" / f"{name}.c" for name in ("can_db", "can_catalog")]
@@ -70,11 +73,13 @@ def heard(
 
 def refusal(frames: list[Frame]) -> tuple[str, str] | None:
     """Part and check that the frames name; None when nothing is said."""
-    names = {getattr(lib, name): name.removeprefix("IMAGE_") for name in STATUSES}
+    names = CODECS["BootRefusal"].choices
     for frame in frames:
-        if frame.frame_id == CODECS["Identity"].frame_id:
-            reason = int(CODECS["Identity"].decode(frame.data)["ModelHash"])
-            return PARTS[reason // 256], names[reason % 256]
+        if frame.frame_id == CODECS["BootRefusal"].frame_id:
+            values = CODECS["BootRefusal"].decode(frame.data)
+            part = names["RefusedPart"][int(values["RefusedPart"])]
+            check = camel_to_snake_case(names["FailedCheck"][int(values["FailedCheck"])])
+            return part.upper().removesuffix("STAGE"), check.upper()
     return None
 
 
@@ -94,6 +99,7 @@ def says_no_current_and_why(frames: list[Frame], part: str, status: str) -> None
         for faults in ("ActiveFaults", "LatchedFaults"):
             assert value.get(faults, 1 << CALIBRATION_FAULT) == 1 << CALIBRATION_FAULT
         assert value.get("FirmwareVersion", 0) == 0
+        assert value.get("NetworkVersion", VERSION) == VERSION
     assert refusal(frames) == (part, status)
 
 
@@ -104,7 +110,7 @@ def refusals(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Any]:
 
 def frames_of(library: tuple[Any, Any], part: str, status: str, periods: int = 40) -> list[Frame]:
     ffi, native = library
-    frames, spoken = ffi.new("can_frame_t[3]"), []
+    frames, spoken = ffi.new("can_frame_t[]", len(SPOKEN)), []
     for period in range(periods):
         code = getattr(native, f"REFUSAL_{part}"), getattr(native, f"IMAGE_{status}")
         native.refusal_frames(*code, period, frames)
@@ -112,7 +118,7 @@ def frames_of(library: tuple[Any, Any], part: str, status: str, periods: int = 4
     return spoken
 
 
-@pytest.mark.parametrize("part", PARTS.values())
+@pytest.mark.parametrize("part", PARTS)
 @pytest.mark.parametrize("status", STATUSES)
 def test_a_refusal_is_told_by_frames_that_the_charger_trusts(
     refusals: tuple[Any, Any], part: str, status: str
@@ -120,7 +126,7 @@ def test_a_refusal_is_told_by_frames_that_the_charger_trusts(
     name = status.removeprefix("IMAGE_")
     frames = frames_of(refusals, part, name)
     says_no_current_and_why(frames, part, name)
-    assert [f.frame_id for f in frames[:3]] == [CODECS[name].frame_id for name in SPOKEN]
+    assert [f.frame_id for f in frames[: len(SPOKEN)]] == [CODECS[name].frame_id for name in SPOKEN]
 
 
 @pytest.mark.parametrize(
@@ -132,9 +138,10 @@ def test_a_refusal_is_told_by_frames_that_the_charger_trusts(
         (".active_faults = faults,", ""),
         (".latched_faults = faults,", ""),
         ("(uint8_t)period", "0u"),
-        ("if (message->is_protected)", "if (period == 0u)"),
-        ("+ (uint32_t)status", ""),
-        ("(uint32_t)part * PART_FACTOR", "PART_FACTOR"),
+        ("if (MESSAGES[i]->is_protected)", "if (period == 0u)"),
+        (".failed_check = (uint8_t)status,", ""),
+        (".refused_part = (uint8_t)part,", ""),
+        ("write_refusal(part, status, &frames[2]);", ""),
     ],
     ids=lambda change: change[0],
 )
@@ -148,7 +155,7 @@ def test_what_is_in_order_is_started(tmp_path: Path) -> None:
     with Emulation(put(image(), tmp_path), BOARD) as board, open_bus(board.bus) as bus:
         assert bus.receive(SILENCE_S) is None, "the application waits for a first frame"
         bus.send(Frame(CODECS["SYNC"].frame_id, b""))
-        answer = [bus.receive(ANSWER_TIMEOUT_S) for _ in range(7)]
+        answer = [bus.receive(ANSWER_TIMEOUT_S) for _ in range(8)]
     assert answer[-1] is not None and answer[-1].frame_id == CODECS["ChargeCommand"].frame_id
     identity = CODECS["Identity"].decode(answer[4].data) if answer[4] else {}
     assert identity["FirmwareVersion"] == lib.BMS_FIRMWARE_VERSION

@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 
 from bms.firmware import Ecu
 from bms.firmware._firmware import ffi, lib
+from codegen.can_database import network_version
 from tests.firmware.bench import DATABASE, HEALTHY, frame
 
 SINGLE = st.floats(width=32)
 MESSAGES = sorted(DATABASE.messages, key=lambda m: (m.name == "ChargeCommand", m.frame_id))
 RECEIVED = [m for m in MESSAGES if m.senders == ["PLANT"] and m.length]
-TRANSMITTED = [m for m in MESSAGES if m.senders == ["ECU"]]
+TRANSMITTED = [m for m in MESSAGES if m.senders == ["ECU"] and m.name != "BootRefusal"]
 
 MEASUREMENT_FIELDS = {
     "Current": "current_A",
@@ -27,6 +28,8 @@ MEASUREMENT_FIELDS = {
     "Request": "request",
     "ReferenceCurrent": "reference_current_A",
     "PlugInStateOfCharge": "plug_in_soc",
+    "Mode": "mode",
+    "TimeToFull": "time_to_full_s",
 }
 PHYSICAL_FIELDS = {
     "CommandCurrent": "command_A",
@@ -47,8 +50,7 @@ CODE_FIELDS = {
     "ActiveConstraint": "active_constraint",
     "Feasible": "feasible",
     "FirstFault": "first_fault",
-    "ActiveFaults": "active_faults",
-    "LatchedFaults": "latched_faults",
+    "FaultPage": "fault_page",
     "ModelHash": "model_hash",
     "PresetHash": "preset_hash",
     "FirmwareVersion": "firmware_version",
@@ -60,8 +62,10 @@ CODE_FIELDS = {
     "LostFrames": "reported_counts.lost",
     "ReorderedFrames": "reported_counts.reordered",
 }
-BITS = {"active_faults": 20, "latched_faults": 20, "model_hash": 32}
-BITS |= {"preset_hash": 16, "firmware_version": 16}
+FAULT_FIELDS = ("active_faults", "latched_faults")
+BITS = {"active_faults": 32, "latched_faults": 32, "model_hash": 32, "preset_hash": 16}
+FIRST_FAULTS = 20
+FAULT_AND_VERSION = ("ActiveFaults", "LatchedFaults", "MoreFaults", "NetworkVersion")
 
 
 def payload_signals(message: Any) -> list[Any]:
@@ -77,9 +81,21 @@ def all_ones(signal: Any) -> int:
 def reports(draw: st.DrawFn) -> dict[str, Any]:
     """Values for every field of a report, sensible or not."""
     values: dict[str, Any] = {f: draw(SINGLE) for f in PHYSICAL_FIELDS.values()}
-    for name in set(CODE_FIELDS.values()):
+    for name in {*CODE_FIELDS.values(), *FAULT_FIELDS}:
         values[name] = draw(st.integers(0, 2 ** BITS.get(name, 8) - 1))
+    values["fault_page"] = draw(st.integers(0, 1) | st.integers(0, 255))
     return values
+
+
+def fault_signals(values: dict[str, Any]) -> dict[str, int]:
+    """What the signals with a bit for each fault, and that of the database's version, say."""
+    shown = values["active_faults" if values["fault_page"] == 0 else "latched_faults"]
+    return {
+        "ActiveFaults": values["active_faults"] % 2**FIRST_FAULTS,
+        "LatchedFaults": values["latched_faults"] % 2**FIRST_FAULTS,
+        "MoreFaults": shown >> FIRST_FAULTS,
+        "NetworkVersion": network_version(DATABASE),
+    }
 
 
 def report_in_c(values: dict[str, Any]) -> Any:
@@ -98,7 +114,7 @@ def report_in_c(values: dict[str, Any]) -> Any:
 def test_every_signal_of_the_database_is_covered_here() -> None:
     sent = {s.name for m in TRANSMITTED for s in payload_signals(m)}
     received = {s.name for m in RECEIVED for s in payload_signals(m)}
-    assert sent == {*PHYSICAL_FIELDS, *CODE_FIELDS}
+    assert sent == {*PHYSICAL_FIELDS, *CODE_FIELDS, *FAULT_AND_VERSION}
     assert received == set(MEASUREMENT_FIELDS)
 
 
@@ -113,6 +129,9 @@ def test_what_the_ecu_sends_reads_back_with_cantools(values: dict[str, Any]) -> 
         )
         for signal in payload_signals(message):
             raw = raws[signal.name]
+            if signal.name in FAULT_AND_VERSION:
+                assert raw == fault_signals(values)[signal.name], signal.name
+                continue
             if signal.name in CODE_FIELDS:
                 assert raw == min(values[CODE_FIELDS[signal.name]], all_ones(signal)), signal.name
                 continue
@@ -156,4 +175,7 @@ def test_every_message_of_the_ecu_has_exactly_one_row_in_the_transmit_table() ->
     ecu = Ecu("lin2014")
     ecu.step()
     assert [frame_id for frame_id, _ in ecu.transmit()] == [m.frame_id for m in TRANSMITTED]
-    assert {m.name for m in MESSAGES} - {m.name for m in (*RECEIVED, *TRANSMITTED)} == {"SYNC"}
+    assert {m.name for m in MESSAGES} - {m.name for m in (*RECEIVED, *TRANSMITTED)} == {
+        "SYNC",
+        "BootRefusal",  # see test_boot.py
+    }

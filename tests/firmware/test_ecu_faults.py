@@ -13,12 +13,12 @@ from bms.firmware._firmware import ffi, lib
 from tests.firmware.bench import DATABASE, HEALTHY, MEASURED, Bench, frame
 
 NOT_AVAILABLE = {
-    "Current": 66.07,
+    "Current": 1048.574,
     "Voltage": 6.5535,
     "SurfaceTemperature": 527.675,
     "CoolantTemperature": 527.675,
     "CoolingPower": 45.535,
-    "ReferenceCurrent": 66.07,
+    "ReferenceCurrent": 1048.574,
     "PlugInStateOfCharge": 1.3107,
 }
 
@@ -181,7 +181,7 @@ def test_reordered_frames_of_one_message_do_not_pass() -> None:
 def test_foreign_frames_change_nothing() -> None:
     plain, crowded = Bench(), Bench()
     for period in range(40):
-        for foreign in (0x000, 0x080, 0x0FF, 0x104, 0x7FF, 0x1FFFFFFF, 0x180):
+        for foreign in (0x000, 0x080, 0x0FF, 0x105, 0x188, 0x7FF, 0x1FFFFFFF, 0x180):
             crowded.ecu.receive(foreign, bytes(period % 9))
         assert plain.period(Request=period > 3) == crowded.period(Request=period > 3)
 

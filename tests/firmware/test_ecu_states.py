@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
-from tests.firmware.bench import DATABASE, MEASURED, READY_PERIODS, STATES, Bench
+from bms.firmware._firmware import lib
+from codegen.can_database import network_version
+from tests.firmware.bench import DATABASE, READY_PERIODS, RECEIVED, STATES, Bench
 
 
 def test_before_all_measurements_came_it_stays_in_init_at_zero() -> None:
@@ -160,20 +164,36 @@ def test_every_message_of_the_database_is_received_or_sent() -> None:
     sent = set()
     for _ in range(10):
         ecu.step()
-        sent |= {frame_id for frame_id, _ in ecu.transmit()}
-    expected = {m.frame_id for m in DATABASE.messages if m.senders == ["ECU"]}
-    assert sent == expected
+        sent |= {DATABASE.get_message_by_frame_id(frame_id).name for frame_id, _ in ecu.transmit()}
+    of_the_boot_stage = {"BootRefusal"}
+    assert sent | of_the_boot_stage == {m.name for m in DATABASE.messages if m.senders == ["ECU"]}
+    assert not sent & of_the_boot_stage
     received = {m.name for m in DATABASE.messages if m.senders == ["PLANT"] and m.length}
-    assert received == set(MEASURED)
+    assert received == set(RECEIVED)
 
 
-def test_identity_names_model_and_preset() -> None:
+def test_identity_names_model_preset_and_versions() -> None:
     bench = Bench()
     answers = [bench.period() for _ in range(10)]
     named = [a for a in answers if "ModelHash" in a]
     assert len(named) == 1
     assert named[0]["ModelHash"] == int(bench.ecu.model.hash[:8], 16)
     assert named[0]["PresetHash"] == int(bench.ecu.preset.hash[:4], 16)
+    assert named[0]["FirmwareVersion"] == lib.BMS_FIRMWARE_VERSION
+    assert named[0]["NetworkVersion"] == network_version(DATABASE)
+
+
+def test_faults_active_and_latched_take_turns_in_the_second_message() -> None:
+    """There are no faults beyond the first message yet, so some are put into memory by hand."""
+    bench = Bench()
+    bench.start()
+    bench.ecu._state.monitor.latched = 1 << 20 | 1 << 31 | 1 << 5
+    answers = [bench.period() for _ in range(40)]
+    assert {answer["LatchedFaults"] for answer in answers} == {1 << 5}
+    said = {n: (a["FaultPage"], a["MoreFaults"]) for n, a in enumerate(answers) if "FaultPage" in a}
+    assert [b - a for a, b in pairwise(said)] == 7 * [5]
+    active, latched = (0, 0), (1, 1 | 1 << 11)
+    assert list(said.values()) in (4 * [active, latched], 4 * [latched, active])
 
 
 def test_charge_command_is_the_last_frame_of_every_period() -> None:

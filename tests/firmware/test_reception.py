@@ -11,7 +11,7 @@ from codegen.can_database import data_ids, load_database, number_attribute
 
 DATABASE = load_database()
 COMMAND = DATABASE.get_message_by_name("ChargeCommand")
-FROM_ECU = [m for m in DATABASE.messages if m.senders == ["ECU"]]
+FROM_ECU = [m for m in DATABASE.messages if m.senders == ["ECU"] and m.name != "BootRefusal"]
 POLICY = {
     "E2EMaxDeltaCounter": lambda policy: policy.max_delta_counter,
     "E2EWindowSize": lambda policy: policy.window_periods,
@@ -24,7 +24,7 @@ POLICY = {
 }
 
 
-def frame(counter: int, length: int = 4) -> bytes:
+def frame(counter: int, length: int = COMMAND.length) -> bytes:
     plain = bytes([0, counter % 16] + [7] * (length - 2))
     return bytes(cantools.autosar.apply_profile2_crc(plain, data_ids(COMMAND)[counter % 16]))
 

@@ -14,12 +14,13 @@ from bms.firmware._firmware import ffi, lib
 from bms.presets import load_preset
 from codegen.can_database import load_database, number_attribute
 from hil_sim.plant.charger import Charger
-from tests.firmware.bench import DATABASE, MEASURED, READY_PERIODS, Bench, frame
+from tests.firmware.bench import DATABASE, HEALTHY, MEASURED, READY_PERIODS, RECEIVED, Bench, frame
 
 NO_DATA, INIT, VALID, INVALID = range(4)
 LIMITS = st.tuples(st.integers(1, 8), st.integers(0, 8))
 PERIODS = st.lists(st.tuples(st.booleans(), st.booleans()), max_size=60)
 PERIOD_MS = 100
+EVERYTHING_SENT = {**HEALTHY, "Mode": 0}
 
 
 @dataclass
@@ -80,13 +81,13 @@ def test_state_and_use_follow_the_described_machine(
         assert receiver.state == model.state
 
 
-def reports(bench: Bench, periods: int = 20) -> dict[str, dict[str, Any]]:
+def reports(bench: Bench, periods: int = 25) -> dict[str, dict[str, Any]]:
     """What the ECU says of each message, by name, within `periods`."""
     found = {}
     for _ in range(periods):
         answer = bench.period()
         if "ReportedMessage" in answer:
-            found[MEASURED[int(answer["ReportedMessage"])]] = {
+            found[RECEIVED[int(answer["ReportedMessage"])]] = {
                 name: answer[name] for name in ("ReportedState", *DISTURBANCES)
             }
     return found
@@ -101,10 +102,10 @@ DISTURBANCES = {
 }
 
 
-@pytest.mark.parametrize("name", MEASURED)
+@pytest.mark.parametrize("name", RECEIVED)
 @pytest.mark.parametrize("kind", DISTURBANCES)
 def test_a_disturbance_is_reported_for_its_message_and_kind_only(name: str, kind: str) -> None:
-    bench = Bench()
+    bench = Bench(values=dict(EVERYTHING_SENT))
     bench.start()
     sent = frame(name, bench.counters[name], bench.values)
     make = DISTURBANCES[kind]
@@ -116,7 +117,7 @@ def test_a_disturbance_is_reported_for_its_message_and_kind_only(name: str, kind
     found = reports(bench)
     # A frame that cannot be read is also missing in the sequence of those that can.
     follow = {"LostFrames"} if kind.startswith("Wrong") else set()
-    assert set(found) == set(MEASURED)
+    assert set(found) == set(RECEIVED)
     for message, report in found.items():
         counted = {n for n in DISTURBANCES if report[n]}
         assert counted == ({kind} | follow if message == name else set())
@@ -124,24 +125,24 @@ def test_a_disturbance_is_reported_for_its_message_and_kind_only(name: str, kind
         assert report["ReportedState"] == VALID
 
 
-@pytest.mark.parametrize("name", MEASURED)
+@pytest.mark.parametrize("name", RECEIVED)
 def test_silence_makes_a_message_invalid_and_its_return_valid_again(name: str) -> None:
-    bench = Bench()
+    bench = Bench(values=dict(EVERYTHING_SENT))
     bench.start()
     for _ in range(5):
         bench.period(drop=(name,))
     silent = reports_while_dropping(bench, name)
     assert silent[name]["ReportedState"] == INVALID
-    assert {silent[other]["ReportedState"] for other in MEASURED if other != name} == {VALID}
-    assert reports(bench, 30)[name]["ReportedState"] == VALID
+    assert {silent[other]["ReportedState"] for other in RECEIVED if other != name} == {VALID}
+    assert reports(bench, 35)[name]["ReportedState"] == VALID
 
 
 def reports_while_dropping(bench: Bench, name: str) -> dict[str, dict[str, Any]]:
     found = {}
-    for _ in range(20):
+    for _ in range(25):
         answer = bench.period(drop=(name,))
         if "ReportedMessage" in answer:
-            found[MEASURED[int(answer["ReportedMessage"])]] = dict(answer)
+            found[RECEIVED[int(answer["ReportedMessage"])]] = dict(answer)
     return found
 
 
@@ -181,7 +182,7 @@ def test_a_message_often_damaged_beside_good_ones_is_not_used_any_more(name: str
 
 
 def test_messages_of_the_start_are_not_used_before_they_are_valid() -> None:
-    bench = Bench()
+    bench = Bench(values=dict(EVERYTHING_SENT))
     for _ in range(READY_PERIODS - 1):
         bench.period(Request=0)
         assert not any(bench.ecu._state.network.is_usable)
@@ -229,6 +230,14 @@ def test_names_of_faults_states_and_messages_in_the_database_are_the_firmware_s(
     assert names("Diagnostics", "DiagnosticState") == states
     supervision = spelled("E2E_", ffi.typeof("e2e_state_t").elements)
     assert names("NetworkDiagnostics", "ReportedState") == supervision
+    modes = spelled("MODE_", ffi.typeof("codec_mode_t").elements)
+    assert names("ChargeMode", "Mode") == {**modes, 15: "NotAvailable"}
+    requests = spelled("REQUEST_", ffi.typeof("codec_request_t").elements)
+    assert names("ChargeRequest", "Request") == {**requests, 15: "NotAvailable"}
+    pages = spelled("FAULT_PAGE_", ffi.typeof("codec_fault_page_t").elements)
+    assert names("Diagnostics2", "FaultPage") == pages
+    checks = spelled("IMAGE_", ffi.typeof("image_status_t").elements)
+    assert {**names("BootRefusal", "FailedCheck"), lib.IMAGE_OK: "Ok"} == checks
     constraints = spelled("RCBF_", ffi.typeof("rcbf_active_t").elements)
     assert names("Decision", "ActiveConstraint") == constraints
-    assert names("NetworkDiagnostics", "ReportedMessage") == dict(enumerate(MEASURED))
+    assert names("NetworkDiagnostics", "ReportedMessage") == dict(enumerate(RECEIVED))

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bms.barrier import BusQuantisation
 from bms.barrier.surface_prediction import surface_prediction
+from bms.bus_signals import BusQuantisation
 from bms.cell import CellState, Disturbance, integrate_step
 from bms.firmware import Ecu
 from bms.firmware._firmware import ffi, lib

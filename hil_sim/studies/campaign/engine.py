@@ -149,7 +149,7 @@ def _signals() -> dict[str, Any]:
     signals = {
         signal.name: {
             "scale": signal.scale,
-            "offset": signal.offset,
+            "offset_steps": round(signal.offset / signal.scale),
             "lowest": round((signal.minimum - signal.offset) / signal.scale),
             "highest": round((signal.maximum - signal.offset) / signal.scale),
         }

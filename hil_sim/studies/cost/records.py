@@ -12,11 +12,11 @@ from bms.arrays import IntArray
 from hil_sim.bus.buses import Frame
 
 ESTIMATOR_INPUTS = 8
-FRAMES = 4
+MOST_FRAMES = 5
 _RESTART, _PERIOD, _STATE = range(3)
 _FRAME = struct.Struct("<IB8s3x")
 _STATE_CONTENT = struct.Struct("<8f9f")
-_CONTENT_BYTES = max(FRAMES * _FRAME.size, _STATE_CONTENT.size)
+_CONTENT_BYTES = max(MOST_FRAMES * _FRAME.size, _STATE_CONTENT.size)
 _COUNTERS = 4
 
 # 25 MHz timer, and 2^6 ns of the emulator's time for each instruction.
@@ -49,10 +49,11 @@ def restart() -> bytes:
 
 
 def period(frames: Sequence[Frame]) -> bytes:
-    """A control period with the frames that the ECU receives in it; ValueError unless four."""
-    if len(frames) != FRAMES:
-        raise ValueError(f"a period has {FRAMES} frames, not {len(frames)}")
-    return _record(_PERIOD, b"".join(_FRAME.pack(f.frame_id, len(f.data), f.data) for f in frames))
+    """A control period with the frames that the ECU receives in it; ValueError for too many."""
+    if len(frames) > MOST_FRAMES:
+        raise ValueError(f"a period has at most {MOST_FRAMES} frames, not {len(frames)}")
+    content = b"".join(_FRAME.pack(f.frame_id, len(f.data), f.data) for f in frames)
+    return _record(_PERIOD, content, len(frames))
 
 
 def state(state: State) -> bytes:
@@ -83,5 +84,5 @@ def counts(results: bytes) -> Counts:
     return Counts(*np.maximum(instructions, 0.0).astype(np.int64).T)
 
 
-def _record(kind: int, content: bytes) -> bytes:
-    return struct.pack("<I", kind) + content.ljust(_CONTENT_BYTES, b"\0")
+def _record(kind: int, content: bytes, frames: int = 0) -> bytes:
+    return struct.pack("<II", kind, frames) + content.ljust(_CONTENT_BYTES, b"\0")

@@ -86,7 +86,8 @@ void fuzz_deliver_foreign(fuzzer_t *fuzzer)
 
 void fuzz_damage_values(fuzzer_t *fuzzer, float values[VALUE_COUNT])
 {
-    static const float SIZE[VALUE_COUNT] = { 10.0f, 0.6f, 20.0f, 20.0f, 3.0f, 30.0f, 0.5f, 3.0f };
+    static const float SIZE[VALUE_COUNT] = { 10.0f, 0.6f, 20.0f, 20.0f, 3.0f,
+                                             30.0f, 0.5f, 3.0f,  3.0f,  7200.0f };
     random_t *random = &fuzzer->random;
     if (fuzzer->wrong_periods == 0u) {
         if (!random_chance(random, fuzzer->value_share)) {

@@ -12,7 +12,7 @@
 #include "can_db.h"
 #include "fuzz.h"
 
-#define ZERO_CURRENT_RAW 32500u /* 0 A at -65 A and 2 mA a step */
+#define ZERO_CURRENT_RAW 524288u /* 0 A, in the middle of 20 bits */
 
 static void follow_request(fuzzer_t *fuzzer)
 {
@@ -28,6 +28,14 @@ static void follow_request(fuzzer_t *fuzzer)
         session->is_on = fuzzer->off_periods == 0u;
         session->plug_in_soc = session->cell.soc;
     }
+}
+
+/* A charger that says how to charge may be exchanged for one that does not. */
+static void choose_mode(fuzzer_t *fuzzer)
+{
+    random_t *random = &fuzzer->random;
+    fuzzer->session.sends_mode = random_chance(random, 512u);
+    fuzzer->session.mode = random_chance(random, 512u) ? MODE_FIXED : MODE_FASTEST;
 }
 
 static bool is_refused(const fuzzer_t *fuzzer, const char *reason)
@@ -61,7 +69,7 @@ static bool listen(fuzzer_t *fuzzer)
         statistics->symptoms[fault] += is_seen ? 1u : 0u;
     }
     for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
-        must_stop = must_stop || !fuzzer->came_intact[i];
+        must_stop = must_stop || (!CAN_RECEIVED[i].is_optional && !fuzzer->came_intact[i]);
         fuzzer->came_intact[i] = false;
         statistics->supervision[i][fuzzer->bms.network.receivers[i].state & 3u]++;
     }
@@ -101,9 +109,15 @@ static bool run_period(fuzzer_t *fuzzer)
     random_t *random = &fuzzer->random;
     float values[VALUE_COUNT];
     follow_request(fuzzer);
+    if (random_chance(random, 1u)) {
+        choose_mode(fuzzer);
+    }
     session_measure(&fuzzer->session, values);
     fuzz_damage_values(fuzzer, values);
     for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
+        if (!session_sends(&fuzzer->session, i)) {
+            continue;
+        }
         const can_frame_t frame = session_frame(&fuzzer->session, i, values);
         if (random_chance(random, fuzzer->frame_share)) {
             fuzz_deliver_damaged(fuzzer, i, frame);
@@ -143,6 +157,7 @@ static bool run_episode(fuzzer_t *fuzzer, uint64_t frames)
     fuzzer->last_state = BMS_INIT;
     session_begin(&fuzzer->session, random_between(random, 0.02f, 0.985f),
                   random_between(random, 288.0f, 316.0f));
+    choose_mode(fuzzer);
     bms_init(&fuzzer->bms, random_chance(random, 16u) ? &NONE : &GOOD);
     for (uint32_t left = 64u + random_below(random, 4096u); left > 0u; left--) {
         if (!run_period(fuzzer)) {

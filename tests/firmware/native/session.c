@@ -34,18 +34,31 @@ void session_measure(const session_t *session, float values[VALUE_COUNT])
     values[VALUE_REFERENCE] = session->reference_A;
     values[VALUE_PLUG_IN_SOC] = session->plug_in_soc;
     values[VALUE_REQUEST] = session->is_on ? (float)REQUEST_CHARGE : (float)REQUEST_OFF;
+    values[VALUE_MODE] = (float)session->mode;
+    values[VALUE_TIME_TO_FULL] = 3600.0f;
+}
+
+static uint32_t raw_wide(uint32_t signal, float value)
+{
+    return codec_encode(&CAN_SIGNALS[signal], value, CODEC_NEAREST);
 }
 
 static uint16_t raw(uint32_t signal, float value)
 {
-    return codec_encode(&CAN_SIGNALS[signal], value, CODEC_NEAREST);
+    return (uint16_t)raw_wide(signal, value);
+}
+
+/* A code of four bits; what it cannot hold is not available. */
+static uint8_t code(float value)
+{
+    return ((value >= 0.0f) && (value < 15.0f)) ? (uint8_t)value : 15u;
 }
 
 static void pack(uint32_t message, const float values[VALUE_COUNT], uint8_t data[8])
 {
     if (message == CAN_RECEIVED_CELL_ELECTRICAL) {
         const struct can_db_cell_electrical_t electrical = {
-            .current = raw(CAN_SIGNAL_CURRENT, values[VALUE_CURRENT]),
+            .current = raw_wide(CAN_SIGNAL_CURRENT, values[VALUE_CURRENT]),
             .voltage = raw(CAN_SIGNAL_VOLTAGE, values[VALUE_VOLTAGE]),
         };
         (void)can_db_cell_electrical_pack(data, &electrical, 8u);
@@ -60,16 +73,26 @@ static void pack(uint32_t message, const float values[VALUE_COUNT], uint8_t data
             .cooling_power = raw(CAN_SIGNAL_COOLING_POWER, values[VALUE_COOLING]),
         };
         (void)can_db_coolant_pack(data, &coolant, 8u);
+    } else if (message == CAN_RECEIVED_CHARGE_MODE) {
+        const struct can_db_charge_mode_t mode = {
+            .mode = code(values[VALUE_MODE]),
+            .time_to_full = raw(CAN_SIGNAL_TIME_TO_FULL, values[VALUE_TIME_TO_FULL]),
+        };
+        (void)can_db_charge_mode_pack(data, &mode, 8u);
     } else {
-        const float request = values[VALUE_REQUEST];
         const struct can_db_charge_request_t asked = {
-            .request = ((request >= 0.0f) && (request < 15.0f)) ? (uint8_t)request : 15u,
-            .reference_current = raw(CAN_SIGNAL_REFERENCE_CURRENT, values[VALUE_REFERENCE]),
+            .request = code(values[VALUE_REQUEST]),
+            .reference_current = raw_wide(CAN_SIGNAL_REFERENCE_CURRENT, values[VALUE_REFERENCE]),
             .plug_in_state_of_charge =
                 raw(CAN_SIGNAL_PLUG_IN_STATE_OF_CHARGE, values[VALUE_PLUG_IN_SOC]),
         };
         (void)can_db_charge_request_pack(data, &asked, 8u);
     }
+}
+
+bool session_sends(const session_t *session, uint32_t message)
+{
+    return session->sends_mode || !CAN_RECEIVED[message].is_optional;
 }
 
 void session_protect(can_frame_t *frame, uint32_t message, uint8_t counter)

@@ -17,6 +17,8 @@ typedef enum {
     VALUE_REFERENCE,
     VALUE_PLUG_IN_SOC,
     VALUE_REQUEST,
+    VALUE_MODE,
+    VALUE_TIME_TO_FULL,
     VALUE_COUNT
 } session_value_t;
 
@@ -32,6 +34,8 @@ typedef struct {
 typedef struct {
     session_cell_t cell;
     bool is_on; /* the charge is requested */
+    bool sends_mode; /* the optional message comes too */
+    codec_mode_t mode;
     float reference_A;
     float plug_in_soc;
     uint8_t counters[CAN_RECEIVED_COUNT];
@@ -41,6 +45,9 @@ void session_begin(session_t *session, float soc, float temperature_K);
 
 /* What a perfect sensor reads, and what the charger asks for. */
 void session_measure(const session_t *session, float values[VALUE_COUNT]);
+
+/* Whether a message is sent at present. */
+bool session_sends(const session_t *session, uint32_t message);
 
 /* The frame of a message with these values and the message's next counter. */
 can_frame_t session_frame(session_t *session, uint32_t message, const float values[VALUE_COUNT]);

@@ -7,13 +7,18 @@
 
 static double raw_of(const link_signal_t *signal, double value)
 {
-    const double steps = (value - signal->offset) / signal->scale;
+    const double steps = value / signal->scale - signal->offset_steps;
     return rint(fmin(fmax(steps, signal->lowest), signal->highest));
+}
+
+static double value_of(const link_signal_t *signal, double raw)
+{
+    return (raw + signal->offset_steps) * signal->scale;
 }
 
 double link_over_the_bus(const link_signal_t *signal, double value)
 {
-    return raw_of(signal, value) * signal->scale + signal->offset;
+    return value_of(signal, raw_of(signal, value));
 }
 
 static void send(link_t *link, uint32_t index, can_frame_t *frame)
@@ -28,19 +33,20 @@ static void send(link_t *link, uint32_t index, can_frame_t *frame)
 static void send_readings(link_t *link, const link_signals_t *signals,
                           const double readings[LINK_READINGS])
 {
-    uint16_t raw[LINK_READINGS];
+    uint32_t raw[LINK_READINGS];
     for (uint32_t i = 0u; i < LINK_READINGS; i++) {
-        raw[i] = (uint16_t)raw_of(&signals->readings[i], readings[i]);
+        raw[i] = (uint32_t)raw_of(&signals->readings[i], readings[i]);
     }
     can_frame_t frame = { 0 };
-    const struct can_db_cell_electrical_t electrical = { .current = raw[0], .voltage = raw[1] };
+    const struct can_db_cell_electrical_t electrical = { .current = raw[0],
+                                                         .voltage = (uint16_t)raw[1] };
     (void)can_db_cell_electrical_pack(frame.data, &electrical, sizeof frame.data);
     send(link, CAN_RECEIVED_CELL_ELECTRICAL, &frame);
-    const struct can_db_cell_thermal_t thermal = { .surface_temperature = raw[2],
-                                                   .coolant_temperature = raw[3] };
+    const struct can_db_cell_thermal_t thermal = { .surface_temperature = (uint16_t)raw[2],
+                                                   .coolant_temperature = (uint16_t)raw[3] };
     (void)can_db_cell_thermal_pack(frame.data, &thermal, sizeof frame.data);
     send(link, CAN_RECEIVED_CELL_THERMAL, &frame);
-    const struct can_db_coolant_t coolant = { .cooling_power = raw[4] };
+    const struct can_db_coolant_t coolant = { .cooling_power = (uint16_t)raw[4] };
     (void)can_db_coolant_pack(frame.data, &coolant, sizeof frame.data);
     send(link, CAN_RECEIVED_COOLANT, &frame);
 }
@@ -60,7 +66,7 @@ static link_answer_t hear(link_t *link, const link_signals_t *signals)
         (void)can_db_charge_command_unpack(&command, frame.data, frame.length);
         const link_signal_t *signal = &signals->command_current;
         answer.intact = (double)command.command_current <= signal->highest;
-        answer.command_A = command.command_current * signal->scale + signal->offset;
+        answer.command_A = value_of(signal, command.command_current);
         answer.state = command.command_state;
     }
     return answer;
@@ -74,7 +80,7 @@ link_answer_t link_exchange(link_t *link, const link_signals_t *signals,
     can_frame_t frame = { 0 };
     const struct can_db_charge_request_t request = {
         .request = charge ? REQUEST_CHARGE : REQUEST_OFF,
-        .reference_current = (uint16_t)raw_of(&signals->reference_current, reference_current_A),
+        .reference_current = (uint32_t)raw_of(&signals->reference_current, reference_current_A),
         .plug_in_state_of_charge = (uint16_t)raw_of(&signals->plug_in_soc, plug_in_soc),
     };
     (void)can_db_charge_request_pack(frame.data, &request, sizeof frame.data);

@@ -10,7 +10,7 @@
 /* Scaling of a signal as the CAN database has it, in double precision; limits in raw units. */
 typedef struct {
     double scale;
-    double offset;
+    double offset_steps;
     double lowest;
     double highest;
 } link_signal_t;
