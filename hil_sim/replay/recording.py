@@ -16,6 +16,7 @@ from hil_sim.bus.buses import Frame
 from hil_sim.bus.catalog import FrameId, Message
 from hil_sim.bus.database import MessageCodec
 from hil_sim.logs import LogFrame, read_log
+from hil_sim.replay.versions import require_version
 
 LAST_MESSAGE = Message.CHARGE_COMMAND
 
@@ -51,14 +52,15 @@ class Recording:
 def load_recording(path: Path) -> Recording:
     """Read a log of any format.
 
-    Raises InputError in one line when it cannot be read, is not of this project's bus, holds no
-    answer, begins in the middle of a run or ends in the middle of a period.
+    Raises InputError in one line when it cannot be read, is not of this project's bus or of another
+    version of it, holds no answer, begins in the middle of a run or ends in the middle of a period.
     """
     messages = can_database.load_database().messages
     database = {message.name: MessageCodec(message) for message in messages}
     sent_by_ecu = frozenset(m.frame_id for m in messages if can_database.ECU in m.senders)
     frames = [frame for frame in read_log(path) if not frame.is_extended]
     _require_ours(path, frames, database)
+    require_version(path, frames, database)
     last_id = database[LAST_MESSAGE].frame_id
     lock_step = any(frame.frame_id == FrameId.SYNC for frame in frames)
     cut = _Cutter(path, sent_by_ecu, last_id)

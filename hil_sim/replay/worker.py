@@ -18,6 +18,7 @@ from bms.native_build import FIRMWARE
 from hil_sim.replay.engine import replay
 from hil_sim.replay.identity import choose_pair
 from hil_sim.replay.recording import load_recording
+from hil_sim.replay.versions import require_answers_of_version
 
 UNUSABLE = 2
 """Exit code when a build or log cannot be used and stderr says why."""
@@ -34,18 +35,25 @@ def main() -> None:
     arguments = parser.parse_args()
     try:
         FIRMWARE.load_build(arguments.build)
-        answers = [_replay(log, arguments.preset, arguments.model) for log in arguments.logs]
+        answers = [
+            _replay(arguments.build, log, arguments.preset, arguments.model)
+            for log in arguments.logs
+        ]
     except BmsError as error:
         print(error, file=sys.stderr)
         sys.exit(UNUSABLE)
     arguments.out.write_text(json.dumps(answers), encoding="utf-8")
 
 
-def _replay(log: Path, preset: str | None, model: Path | None) -> list[list[tuple[int, str]]]:
+def _replay(
+    build: Path, log: Path, preset: str | None, model: Path | None
+) -> list[list[tuple[int, str]]]:
     from bms.firmware import Ecu  # noqa: PLC0415 (the build has to be in place first)
 
     recording = load_recording(log)
     answers = replay(recording, Ecu(*choose_pair(recording, preset, model)))
+    said = [frame for answer in answers for frame in answer]
+    require_answers_of_version(build, said, recording.database)
     return [[(frame.frame_id, frame.data.hex()) for frame in answer] for answer in answers]
 
 
