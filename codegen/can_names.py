@@ -7,7 +7,16 @@ from typing import Any
 from cantools.database.can import Database
 from cantools.database.can.c_source import camel_to_snake_case
 
-from codegen.can_database import ECU, PLANT, database_digest, load_database, network_version
+from codegen.can_database import (
+    BOOT_STAGE_ATTRIBUTE,
+    ECU,
+    OPTIONAL_ATTRIBUTE,
+    PLANT,
+    database_digest,
+    load_database,
+    network_version,
+    number_attribute,
+)
 from codegen.rendering import environment
 
 FILE_NAME = "catalog.py"
@@ -18,8 +27,14 @@ def can_names() -> dict[str, str]:
     database = load_database()
     messages = sorted(database.messages, key=lambda message: message.frame_id)
 
-    def sent_by(node: str) -> list[str]:
-        return [m.name for m in messages if m.senders == [node] and m.length > 0]
+    def sent_by(node: str, attribute: str, value: int) -> list[str]:
+        return [
+            m.name
+            for m in messages
+            if m.senders == [node]
+            and m.length > 0
+            and number_attribute(database, m, attribute) == value
+        ]
 
     text = (
         environment()
@@ -30,8 +45,9 @@ def can_names() -> dict[str, str]:
             messages=[
                 {"constant": _constant(m.name), "name": m.name, "id": m.frame_id} for m in messages
             ],
-            received=sent_by(PLANT),
-            sent=sent_by(ECU),
+            required=sent_by(PLANT, OPTIONAL_ATTRIBUTE, 0),
+            optional=sent_by(PLANT, OPTIONAL_ATTRIBUTE, 1),
+            sent=sent_by(ECU, BOOT_STAGE_ATTRIBUTE, 0),
             tables=_tables(database),
         )
     )

@@ -51,14 +51,16 @@ class Message:
     BOOT_REFUSAL: Final = "BootRefusal"
 
 
-ReceivedName = Literal[
+RequiredName = Literal[
     "CellElectrical",
     "CellThermal",
     "Coolant",
     "ChargeRequest",
-    "ChargeMode",
 ]
-"""Messages with content that the ECU receives, by identifier."""
+"""Messages with content that the ECU has to receive, by identifier."""
+
+OptionalName = Literal["ChargeMode",]
+"""Messages with content that it takes where they come, by identifier."""
 
 SentName = Literal[
     "ChargeCommand",
@@ -69,9 +71,8 @@ SentName = Literal[
     "Identity",
     "NetworkDiagnostics",
     "Diagnostics2",
-    "BootRefusal",
 ]
-"""Messages that the ECU sends, by identifier."""
+"""Messages that the ECU's application sends, by identifier."""
 
 
 class Choice(IntEnum):

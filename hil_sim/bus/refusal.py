@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from bms.firmware.image_checks import IMAGE_STATUS_NAMES
-
-_PARTS = {1: "application", 2: "calibration", 3: "boot stage"}
-_PART_FACTOR = 256
+from hil_sim.bus.catalog import FailedCheck, RefusedPart
 
 
-def refusal_text(model_hash: int) -> str:
-    """In words, by the model hash of an Identity with firmware version 0.
+def refusal_text(part: float | None, check: float | None) -> str:
+    """In words, by the values of RefusedPart and FailedCheck; None where one is not available."""
+    refused, reason = _words(RefusedPart, part), _words(FailedCheck, check)
+    return f"its boot stage refuses the {refused} ({reason}); flash it anew"
 
-    See firmware_c/boot/refusal.h.
-    """
-    part, status = divmod(model_hash, _PART_FACTOR)
-    check = (
-        IMAGE_STATUS_NAMES.get(status, f"check {status}")
-        .removeprefix("IMAGE_")
-        .lower()
-        .replace("_", " ")
-    )
-    return f"its boot stage refuses the {_PARTS.get(part, f'part {part}')} ({check}); flash it anew"
+
+def _words(names: type[RefusedPart] | type[FailedCheck], value: float | None) -> str:
+    label = {choice.value: choice.label for choice in names}.get(int(value or 0), f"number {value}")
+    return label.replace("_", " ")

@@ -63,7 +63,7 @@ def monitor(
             live = stack.enter_context(Live(console=console, screen=True, auto_refresh=False))
 
         def show(snapshot: Snapshot) -> None:
-            in_force = finder.find(snapshot.identity)
+            in_force = finder.find(snapshot.identity, snapshot.refusal)
             if is_screen:
                 live.update(Screen(snapshot, in_force, bus), refresh=True)
             else:

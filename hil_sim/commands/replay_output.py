@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from hil_sim.bus.catalog import NETWORK_VERSION
 from hil_sim.bus.database import Values
 from hil_sim.logs import Unread, described
 from hil_sim.replay.builds import LogVerdict
@@ -40,6 +41,7 @@ class ReplayReport:
         first = comparison.first
         return {
             "log": str(self.recording.path),
+            "network_version": NETWORK_VERSION,
             "preset": self.preset,
             "model_hash": self.model_hash,
             "identity_compared": self.is_identity_compared,
@@ -58,7 +60,8 @@ class ReplayReport:
         """The first difference and the largest ones, or that there is none."""
         comparison = self.comparison
         name = f"{self.recording.path}: {comparison.periods} periods on preset '{self.preset}'"
-        _say(console, f"{name}, model {self.model_hash}")
+        version = f"version {NETWORK_VERSION} of the CAN database"
+        _say(console, f"{name}, model {self.model_hash}, {version}")
         if self.recording.unread:
             _say(console, f"not read: {described(self.recording.unread)}")
         if not self.is_identity_compared:

@@ -13,7 +13,7 @@ from annotated_types import Ge, Le, Len
 
 from bms.errors import InputError
 from bms.validation import Positive, parse, read_toml, strict
-from hil_sim.bus.catalog import FirstFault, ReceivedName
+from hil_sim.bus.catalog import FirstFault, RequiredName
 from hil_sim.bus.database import MessageCodec, load_codecs
 from hil_sim.faults.base import Fault
 from hil_sim.faults.frames import MessageName
@@ -22,7 +22,7 @@ from hil_sim.faults.sensors import SensorName
 
 EACH = "each"
 _EACH_OF = {
-    "message": get_args(ReceivedName),
+    "message": get_args(RequiredName),
     "sensor": get_args(SensorName),
 }
 

@@ -16,12 +16,13 @@ from annotated_types import Ge, Le
 from bms.errors import InputError
 from bms.validation import strict
 from hil_sim.bus.buses import Frame
-from hil_sim.bus.catalog import Message, ReceivedName, SentName
+from hil_sim.bus.catalog import Message, RequiredName, SentName
 from hil_sim.bus.database import COUNTER_MODULUS, MessageCodec, profile2_crc
 from hil_sim.bus.limits import HIGHEST_STANDARD_ID, MAX_DATA_LENGTH
 from hil_sim.faults.base import Fault
 
-MessageName = Literal[ReceivedName, SentName]
+MessageName = Literal[RequiredName, SentName]
+"""What passes in a run: the plant sends no optional message, and a boot stage none that starts."""
 
 
 @dataclass

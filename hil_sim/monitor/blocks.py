@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from hil_sim.bus.catalog import ActiveConstraint, CommandState, ReportedState
+from hil_sim.bus.catalog import ActiveConstraint, CommandState, OptionalName, ReportedState
 from hil_sim.monitor import wording
 from hil_sim.monitor.model import MOST_COUNTED, ReceiverReport, Snapshot
 from hil_sim.monitor.presets import PresetInForce
@@ -153,7 +155,9 @@ def _receiver_state(report: ReceiverReport) -> Text:
         return Text("stale", "red")
     if report.state is None:
         return Text(wording.NOT_AVAILABLE, "dim")
-    return Text(report.state, _RECEIVER_STYLES.get(report.state.lower(), "yellow"))
+    style = _RECEIVER_STYLES.get(report.state.lower(), "yellow")
+    is_missed = report.name not in get_args(OptionalName)
+    return Text(report.state, style if is_missed or style == "green" else "dim")
 
 
 def _counts(report: ReceiverReport) -> list[Text]:

@@ -9,7 +9,9 @@ from codegen import can_database
 from hil_sim.bus.buses import Frame
 from hil_sim.bus.catalog import Message
 from hil_sim.bus.database import MessageCodec, Values
+from hil_sim.bus.fault_bits import FaultBits
 from hil_sim.bus.identity import Identity
+from hil_sim.bus.refusal import refusal_text
 from hil_sim.monitor.listener import ForeignFrame
 from hil_sim.monitor.traffic import ForeignMeter, ForeignTraffic, MessageMeter, MessageTraffic
 
@@ -50,6 +52,8 @@ class Snapshot:
     receivers: tuple[ReceiverReport, ...]
     foreign: ForeignTraffic
     identity: Identity | None
+    fault_bits: Mapping[str, int | None]
+    """Bits of all faults, of those in later messages too, as ActiveFaults and LatchedFaults."""
     choices: Mapping[str, Mapping[int, str]]
 
     def name(self, signal: str) -> str | None:
@@ -59,15 +63,23 @@ class Snapshot:
 
     def faults(self, signal: str) -> list[str] | None:
         """Names of the faults whose bits are set in ActiveFaults or LatchedFaults."""
-        value = self.readings[signal].value
-        if value is None:
+        bits = self.fault_bits[signal]
+        if bits is None or self.readings[signal].value is None:
             return None
-        names, bits = self.choices["FirstFault"], int(value)
+        names = self.choices["FirstFault"]
         return [names.get(n, str(n)) for n in range(bits.bit_length()) if bits >> n & 1]
 
     def message(self, name: str) -> MessageTraffic:
         """Traffic of the message of that name."""
         return next(message for message in self.messages if message.name == name)
+
+    @property
+    def refusal(self) -> str | None:
+        """Why the ECU's boot stage does not start its application; None where it does not say."""
+        part, check = self.readings["RefusedPart"], self.readings["FailedCheck"]
+        if part.is_stale or (part.value is None and check.value is None):
+            return None
+        return refusal_text(part.value, check.value)
 
     @property
     def is_lock_step(self) -> bool:
@@ -94,6 +106,7 @@ class SystemModel:
         self._ids = {codec.name: codec.frame_id for codec in database.values()}
         self._shortest_stale_s = min(meter.stale_s for meter in self._meters.values())
         self._foreign = ForeignMeter()
+        self._faults = FaultBits()
         self._reports: dict[int, tuple[float, Values]] = {}
         self.frames = 0
 
@@ -105,6 +118,7 @@ class SystemModel:
             self._foreign.take(time_s, frame)
             return
         values = meter.take(time_s, frame.data)
+        self._faults.take(values or {})
         if values is not None and meter.codec.name == Message.NETWORK_DIAGNOSTICS:
             self._reports[_whole(values["ReportedMessage"])] = time_s, values
 
@@ -129,6 +143,10 @@ class SystemModel:
             ),
             foreign=self._foreign.traffic(now_s),
             identity=Identity.of(lambda signal: readings[signal].value),
+            fault_bits={
+                "ActiveFaults": self._faults.active,
+                "LatchedFaults": self._faults.latched,
+            },
             choices=self._choices,
         )
 

@@ -26,10 +26,17 @@ class PresetFinder:
         self._given = given
         self._known = [*([given] if given else []), *shipped]
 
-    def find(self, identity: Identity | None) -> PresetInForce:
-        """The preset that the identity names; without one, no limits, whatever was given."""
+    def find(self, identity: Identity | None, refusal: str | None = None) -> PresetInForce:
+        """The preset that the identity names; without one, no limits, whatever was given.
+
+        `refusal` is what the boot stage says where it does not start the application.
+        """
+        if refusal is not None:
+            return PresetInForce(None, f"the ECU does not start: {refusal}")
         if identity is None:
             return PresetInForce(None, "no Identity yet: limits unknown")
+        if identity.other_version is not None:
+            return PresetInForce(None, f"the ECU speaks {identity.other_version}")
         wanted = identity.preset_hash
         preset = next((known for known in self._known if known.hash.startswith(wanted)), None)
         if self._given is not None and preset is not self._given:

@@ -12,6 +12,8 @@ from hil_sim.bus.buses import CanBus, Frame, ecu_remedy, is_serial_line
 from hil_sim.bus.catalog import Message
 from hil_sim.bus.database import COUNTER_MODULUS, MessageCodec, Values
 from hil_sim.bus.e2e import Receiver, Sender
+from hil_sim.bus.fault_bits import FaultBits
+from hil_sim.bus.identity import Identity
 from hil_sim.logs.recorder import Recorder
 from hil_sim.nodes.turns import Turn
 from hil_sim.plant.sensors import Readings
@@ -24,7 +26,9 @@ _REPORTS = (
     Message.DECISION_MARGINS,
     Message.DIAGNOSTICS,
     Message.NETWORK_DIAGNOSTICS,
+    Message.DIAGNOSTICS2,
     Message.IDENTITY,
+    Message.BOOT_REFUSAL,
 )
 _STATES = {state.value: state.label for state in catalog.CommandState}
 _CONSTRAINTS = {constraint.value: constraint.label for constraint in catalog.ActiveConstraint}
@@ -47,9 +51,11 @@ class Request:
 class Answer:
     """What the ECU said in one period: values by signal name, None where it said nothing."""
 
-    def __init__(self, values: Values, is_command_usable: bool) -> None:
+    def __init__(self, values: Values, is_command_usable: bool, latched_faults: int | None) -> None:
         self._values = values
         self._is_command_usable = is_command_usable
+        self.latched_faults = latched_faults
+        """Bit n for fault n; None where the ECU said nothing."""
 
     def value(self, signal: str) -> float | None:
         """Value of a signal in the database's unit."""
@@ -108,8 +114,11 @@ class PlantNode:
         self._request = Sender(database[Message.CHARGE_REQUEST])
         self._sync = Frame(database[Message.SYNC].frame_id, b"")
         self._receivers = {database[name].frame_id: Receiver(database[name]) for name in _REPORTS}
+        self._identity = database[Message.IDENTITY]
         self._command = database[Message.CHARGE_COMMAND]
         self._reception = Reception(self._command.frame_id)
+        self._faults = FaultBits()
+        self._foreign_version: str | None = None
         self._last_counter: int | None = None
         self._is_connected = False
         self._is_answer_late = False
@@ -152,11 +161,24 @@ class PlantNode:
         for attempt in range(CONNECT_ATTEMPTS):
             if attempt == 0 or not is_serial_line(self._bus.name):
                 sent_s, heard = self._publish(period, frames), []
-            heard += self._listen(period)
+            listened = self._listen(period)
+            self._note_version([frame for _, frame in listened])
+            heard += listened
             self._is_connected = self._is_connected or self._is_answered(heard)
             if self._is_connected or not self._turn.sync:
                 return sent_s, heard
+        if self._foreign_version is not None:
+            raise BusError(
+                f"bus '{self._bus.name}': the ECU speaks {self._foreign_version}; flash it anew"
+            )
         raise BusError(f"bus '{self._bus.name}': no ECU answers; {ecu_remedy(self._bus.name)}")
+
+    def _note_version(self, heard: list[Frame]) -> None:
+        """Commands of another version are not intact, so that its ECU seems not to answer."""
+        for frame in heard:
+            if frame.frame_id == self._identity.frame_id:
+                identity = Identity.of((self._identity.decode(frame.data) or {}).get)
+                self._foreign_version = identity.other_version if identity else None
 
     def _publish(self, period: int, frames: list[Frame]) -> float:
         sent_s = self._turn.time_s(period)
@@ -231,7 +253,11 @@ class PlantNode:
                 values.update(receiver.accept(frame.data) or {})
             elif frame.frame_id == self._command.frame_id and self._reception.check(frame.data):
                 values.update(self._command.decode(frame.data) or {})
-        return Answer(values, self._reception.end_period())
+        self._faults.take(values)
+        is_told = values.get("LatchedFaults") is not None
+        return Answer(
+            values, self._reception.end_period(), self._faults.latched if is_told else None
+        )
 
 
 def _label(labels: dict[int, str], value: float | None) -> str | None:

@@ -10,6 +10,7 @@ from bms.presets import Preset, load_preset, preset_names
 from hil_sim.bus.catalog import Message
 from hil_sim.bus.identity import Identity
 from hil_sim.replay.recording import Recording
+from hil_sim.replay.versions import first_identity
 
 
 def choose_pair(
@@ -55,12 +56,8 @@ def recorded_identity(recording: Recording) -> Identity:
 
 
 def _first_identity(recording: Recording) -> Identity | None:
-    codec = recording.database[Message.IDENTITY]
-    for answer in recording.answers:
-        for frame in answer:
-            if frame.frame_id == codec.frame_id and (values := codec.decode(frame.data)):
-                return Identity.of(values.get)
-    return None
+    frames = (frame for answer in recording.answers for frame in answer)
+    return first_identity(frames, recording.database)
 
 
 def _shipped_preset(path: Path, wanted: str) -> str:

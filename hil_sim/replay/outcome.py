@@ -10,7 +10,7 @@ from hil_sim.bus.catalog import Message
 from hil_sim.replay.recording import Answer, Recording
 from hil_sim.replay.signals import Signals
 
-_HEARD = (Message.CHARGE_COMMAND, Message.DIAGNOSTICS)
+_HEARD = (Message.CHARGE_COMMAND, Message.DIAGNOSTICS, Message.DIAGNOSTICS2)
 _SECONDS_PER_HOUR = 3600.0
 
 
@@ -31,7 +31,7 @@ def outcome(recording: Recording, signals: Signals, answers: Sequence[Answer]) -
     for answer in answers:
         values = signals.decode(frame for frame in answer if frame.frame_id in wanted)
         currents_A.append(values.get("CommandCurrent") or 0.0)
-        bits |= int(values.get("ActiveFaults") or 0) | int(values.get("LatchedFaults") or 0)
+        bits |= signals.fault_bits(values)
     times_s = [period.time_s for period in recording.periods]
     lengths_s = [after - before for before, after in pairwise(times_s)]
     charge_As = -sum(current * length for current, length in zip(currents_A, lengths_s))

@@ -18,6 +18,7 @@ from hil_sim.bus.catalog import FrameId, Message
 from hil_sim.bus.database import MessageCodec
 from hil_sim.logs import ALL, Log, LogFrame, Selection, Unread, head_command, log_format, read_log
 from hil_sim.replay.beginning import middle_of_run, require_beginning
+from hil_sim.replay.versions import require_version
 
 LAST_MESSAGE = Message.CHARGE_COMMAND
 
@@ -55,8 +56,8 @@ class Recording:
 def load_recording(path: Path, selection: Selection = ALL) -> Recording:
     """Read a log of any format.
 
-    Raises InputError in one line when it cannot be read, is not of this project's bus, holds no
-    answer, begins in the middle of a run or ends in the middle of a period.
+    Raises InputError in one line when it cannot be read, is not of this project's bus or of another
+    version of it, holds no answer, begins in the middle of a run or ends in the middle of a period.
     """
     messages = can_database.load_database().messages
     database = {message.name: MessageCodec(message) for message in messages}
@@ -66,6 +67,7 @@ def load_recording(path: Path, selection: Selection = ALL) -> Recording:
     unread = Counter(log.unread)
     unread[Unread.EXTENDED_FRAMES] += len(log.frames) - len(frames)
     _require_ours(path, frames, database)
+    require_version(path, frames, database)
     last_id = database[LAST_MESSAGE].frame_id
     lock_step = any(frame.frame_id == FrameId.SYNC for frame in frames)
     cut = _Cutter(path, sent_by_ecu, last_id)

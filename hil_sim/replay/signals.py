@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 
 from codegen import can_database
 from hil_sim.bus.buses import Frame
 from hil_sim.bus.database import MessageCodec, Values
+from hil_sim.bus.fault_bits import FIRST_FAULTS
 
-_FAULT_BITS = ("ActiveFaults", "LatchedFaults")
+_FAULT_BITS = {"ActiveFaults": 0, "LatchedFaults": 0, "MoreFaults": FIRST_FAULTS}
+"""Signals with a bit for each fault, and the fault of the first bit."""
 _UNIT_NAMES = {"": "", "1": "", "1/s": "per_s", "K/s": "K_per_s", "K/s^2": "K_per_s2"}
 
 
@@ -62,9 +66,15 @@ class Signals:
         if value is None:
             return "not available"
         if signal in _FAULT_BITS:
-            return ", ".join(self.faults(int(value))) or "none"
+            return ", ".join(self.faults(int(value) << _FAULT_BITS[signal])) or "none"
         choices = self._choices.get(signal)
         return choices.get(int(value), f"{value:g}") if choices else f"{value:.10g}"
+
+    @staticmethod
+    def fault_bits(values: Values) -> int:
+        """Bits of all faults that are active or latched, as far as these values tell."""
+        told = ((values.get(signal), first) for signal, first in _FAULT_BITS.items())
+        return functools.reduce(operator.or_, (int(bits or 0) << first for bits, first in told))
 
     def faults(self, bits: int) -> list[str]:
         """Names of the faults whose bits are set."""

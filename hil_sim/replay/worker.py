@@ -20,6 +20,7 @@ from hil_sim.logs import Selection
 from hil_sim.replay.engine import replay
 from hil_sim.replay.identity import choose_pair
 from hil_sim.replay.recording import load_recording
+from hil_sim.replay.versions import require_answers_of_version
 
 UNUSABLE = 2
 """Exit code when a build or log cannot be used and stderr says why."""
@@ -40,7 +41,8 @@ def main() -> None:
         FIRMWARE.load_build(arguments.build)
         selection = Selection(arguments.channel, arguments.delta_times)
         answers = [
-            _replay(log, selection, arguments.preset, arguments.model) for log in arguments.logs
+            _replay(arguments.build, log, selection, arguments.preset, arguments.model)
+            for log in arguments.logs
         ]
     except BmsError as error:
         print(error, file=sys.stderr)
@@ -49,12 +51,14 @@ def main() -> None:
 
 
 def _replay(
-    log: Path, selection: Selection, preset: str | None, model: Path | None
+    build: Path, log: Path, selection: Selection, preset: str | None, model: Path | None
 ) -> list[list[tuple[int, str]]]:
     from bms.firmware import Ecu  # noqa: PLC0415 (the build has to be in place first)
 
     recording = load_recording(log, selection)
     answers = replay(recording, Ecu(*choose_pair(recording, preset, model)))
+    said = [frame for answer in answers for frame in answer]
+    require_answers_of_version(build, said, recording.database)
     return [[(frame.frame_id, frame.data.hex()) for frame in answer] for answer in answers]
 
 

@@ -32,6 +32,9 @@ STARTING_PERIODS = 20_000
 SILENT_PERIODS = 5
 """Periods without an intact command that end a run; the charger has stopped well before."""
 
+BOOT_STAGE_VERSION = 0
+"""In place of that of a firmware; the boot stage says in a message of its own why it is there."""
+
 Progress = Callable[[float], None]
 
 
@@ -137,8 +140,11 @@ class Charge:
         fault = answer.value("FirstFault")
         if fault is not None and fault != FirstFault.NONE:
             self.first_fault = int(fault)
+        part, check = answer.value("RefusedPart"), answer.value("FailedCheck")
+        if part is not None or check is not None:
+            raise BusError(f"the ECU does not start: {refusal_text(part, check)}")
         identity = Identity.of(answer.value)
-        if identity is not None:
+        if identity is not None and identity.firmware_version != BOOT_STAGE_VERSION:
             # The message is not protected: one that contradicts the first has to come twice.
             if self.identity is None or identity in (self.identity, self._heard_identity):
                 self._check(identity)
@@ -146,8 +152,8 @@ class Charge:
             self._heard_identity = identity
 
     def _check(self, identity: Identity) -> None:
-        if identity.firmware_version == 0:
-            raise BusError(f"the ECU does not start: {refusal_text(int(identity.model_hash, 16))}")
+        if identity.other_version is not None:
+            raise BusError(f"the ECU speaks {identity.other_version}; flash it anew")
         if not self.preset.hash.startswith(identity.preset_hash):
             raise ModelMismatchError(
                 f"the ECU runs a preset with hash {identity.preset_hash}..., the plant "

@@ -68,8 +68,7 @@ class TimeSeries:
         self.state.append(answer.state)
         self.active_constraint.append(answer.active_constraint)
         self.feasible.append(answer.feasible)
-        latched = answer.value("LatchedFaults")
-        self.latched_faults.append(None if latched is None else int(latched))
+        self.latched_faults.append(answer.latched_faults)
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,8 @@ SETTINGS = MatrixSettings(*load_pair(DEFAULT_PRESET, None), "virtual:matrix")
 QUICK_PERIODS = 40
 COMMAND = "ChargeCommand"
 RECEIVED = ("CellElectrical", "CellThermal", "Coolant", "ChargeRequest")
+"""ChargeMode is missing here: the plant does not send it yet, so that nothing can happen to it in a
+run. tests/firmware/test_charge_mode.py and the fuzzer damage it at the ECU itself."""
 
 
 def is_quick(row):
