@@ -1,4 +1,4 @@
-"""By which version of the CAN database the frames of a log, or of a build's answers, are laid out."""
+"""Which version of the CAN database the frames of a log, or of a build, are laid out by."""
 
 from __future__ import annotations
 
