@@ -10,7 +10,7 @@ from pathlib import Path
 
 from bms.native_build import ROOT
 
-BMS = f"""#!{sys.executable}
+BMS = f"""#!/usr/bin/env python3
 import sys
 if __name__ == "__main__":
     # python-can imports asammdf where it is, which takes seconds here and is not needed.
@@ -19,7 +19,7 @@ if __name__ == "__main__":
     from bms.cli import main
     main()
 """
-"""The command of this Python and these sources."""
+"""The command of these sources, by the first Python on the path."""
 
 
 def run(
@@ -30,6 +30,7 @@ def run(
     program.parent.mkdir(exist_ok=True)
     program.write_text(bms)
     program.chmod(0o755)
+    # The Python that runs this stands before others.
     programs = [str(program.parent), str(Path(sys.executable).parent), os.environ["PATH"]]
     return subprocess.run(
         [str(word) for word in command],

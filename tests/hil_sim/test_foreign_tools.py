@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from collections import Counter
@@ -167,9 +168,9 @@ def test_replay_reads_what_candump_recorded(guest, tmp_path):
 
 
 def test_cantools_decodes_every_frame_to_the_same_values(guest, database):
-    command = commands()["decode"].replace("python ", f"{sys.executable} ", 1)
+    command = commands()["decode"].replace("python ", f"{shlex.quote(sys.executable)} ", 1)
     decoded = subprocess.run(
-        ["bash", "-c", command.replace("codegen/", f"{REPOSITORY}/codegen/")],
+        ["bash", "-c", command.replace("codegen/", f"{shlex.quote(str(REPOSITORY))}/codegen/")],
         cwd=guest / "replayed",
         capture_output=True,
         text=True,

@@ -306,7 +306,7 @@ def test_remedy_conversion_of_a_database_of_python_can(bms, tmp_path):
     said = refused(bms, path)
     command = re.search(r"name it \.db and run '([^']*)'", said)[1]
     path.rename(tmp_path / "FILE.db")
-    run(f"cd {tmp_path} && {sys.executable} {command.removeprefix('python ')}")
+    run(f"cd {tmp_path} && {shlex.quote(sys.executable)} {command.removeprefix('python ')}")
     replayed(bms, tmp_path / "FILE.log")
 
 
