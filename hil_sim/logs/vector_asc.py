@@ -76,7 +76,7 @@ class AscParser:
     def _entry(self, words: Sequence[str]) -> Entry | None:
         kind = words[0].upper()
         if kind.isdigit():
-            return self._classical(words[0], words[1:])._replace(channel=words[0])
+            return self._classical(words[1:])._replace(channel=words[0])
         if kind in ("CANFD", "CANXL"):
             if len(words) < 4:
                 raise UnreadableError(f"a {kind} line has more columns")
@@ -86,7 +86,7 @@ class AscParser:
             return None
         return Entry(None, unread=Unread.OTHER_ENTRIES)
 
-    def _classical(self, channel: str, words: Sequence[str]) -> Entry:
+    def _classical(self, words: Sequence[str]) -> Entry:
         """Identifier, direction, d or r, DLC, data."""
         first = words[0].lower() if words else ""
         if first.startswith("errorframe"):

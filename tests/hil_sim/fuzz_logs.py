@@ -307,12 +307,13 @@ def main() -> None:
 
     def progress(done: int) -> None:
         if done and done % 100_000 == 0:
-            print(f"{done} logs, {time.monotonic() - started_s:.0f} s", flush=True)
+            print(f"{done} logs, {time.monotonic() - started_s:.0f} s", file=sys.stderr)
 
     findings = fuzz(count, seed, progress=progress)
     for (suffix, outcome), number in sorted(findings.outcomes.items()):
         print(f"{suffix:8} {outcome:18} {number:8}")
-    print(f"{count} logs, seed {seed}, the slowest took {findings.slowest_s:.3f} s")
+    print(f"the slowest took {findings.slowest_s:.3f} s", file=sys.stderr)
+    print(f"{count} logs, seed {seed}")
     for fault in findings.wrong[:20]:
         print(fault)
     print(f"{len(findings.wrong)} faults")

@@ -198,6 +198,11 @@ def test_dates_as_candump_shows_them_are_times(tmp_path):
     assert [b.time_s - a.time_s for a, b in zip(log.frames, log.frames[1:])] == [1.0, 1.0]
 
 
+def test_what_candump_shows_with_ascii_is_read(tmp_path):
+    line = b" (0.100000)  can0  123   [3]  41 27 42                  'A'B'\n"
+    assert list(read(tmp_path, "candump -t a", line)) == [LogFrame(0.1, 0x123, b"A'B")]
+
+
 def test_what_candump_shows_without_times_says_how_to_record(tmp_path):
     with pytest.raises(InputError, match=r"no times in it.*candump -L"):
         read(tmp_path, "candump -t a", b"  can0  123   [2]  01 02\n")

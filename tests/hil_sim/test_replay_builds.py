@@ -67,13 +67,9 @@ def test_one_channel_of_a_log_is_compared(bms, tmp_path):
     lines = gzip.decompress((FOLDER / "infeasible.log.gz").read_bytes()).decode().splitlines()
     both = [line.replace("vcan0", channel) for line in lines for channel in ("can0", "can1")]
     (tmp_path / "both.log").write_text("\n".join([*both, ""]))
-    code, _, err = bms("replay", "--against", ROOT, ROOT, tmp_path)
-    assert code == 2
-    assert "both.log: frames of 2 channels" in err
-    against = ("replay", "--against", ROOT, ROOT, tmp_path, "--channel", "can1")
-    code, out, _ = bms(*against, "--json")
-    assert (code, json.loads(out)["logs"][0]["unread"]) == (0, {"other_channel_frames": len(lines)})
-    assert f"both.log: not read: {len(lines)} frames of other channels" in bms(*against)[1]
+    code, out, _ = bms("replay", "--against", ROOT, ROOT, tmp_path, "--channel", "can1")
+    assert code == 0
+    assert f"both.log: not read: {len(lines)} frames of other channels" in out
 
 
 def test_a_build_that_breaks_down_is_named(tmp_path):
