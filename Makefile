@@ -17,7 +17,7 @@ PYTEST := $(BIN)/python -m pytest -n 2
 # What `make quick` tries: the C core, and of Python what is nearest to it.
 QUICK_TESTS ?= tests/firmware tests/codegen tests/bms
 
-.PHONY: help build run quick test lint generate models verify-tables long-checks fuzz benchmark docs clean
+.PHONY: help build run quick test lint generate models verify-tables long-checks fuzz fuzz-frames fuzz-logs benchmark docs clean
 .DEFAULT_GOAL := help
 
 help: ## List the targets
@@ -67,9 +67,14 @@ verify-tables: build/extensions ## Try all 2^32 arguments of every edge of the s
 long-checks: .venv/tests build/extensions ## What takes too long for make test (see results/checks.toml) where its inputs have changed; CHECKS=name alone
 	$(BIN)/python tools/long_checks.py $(CHECKS)
 
-fuzz: .venv/tests build/extensions ## 10^7 random and damaged frames through the ECU with sanitizers; SEED=n for others
+fuzz: fuzz-frames fuzz-logs ## 10^7 damaged frames through the ECU with sanitizers, 10^6 damaged logs through the readers; SEED=n for others
+
+fuzz-frames: .venv/tests build/extensions
 	$(BIN)/python -m tests.firmware.native.build fuzz --sanitize --out build/native
 	build/native/fuzz 10000000 $(or $(SEED),1)
+
+fuzz-logs: .venv/tests build/extensions
+	$(BIN)/python -m tests.hil_sim.fuzz_logs 1000000 $(or $(SEED),1)
 
 benchmark: .venv/tests build/extensions ## Time of a control period of the ECU in C, and what dominates it
 	$(BIN)/python -m tests.firmware.native.build benchmark --out build/native
