@@ -37,13 +37,12 @@ class NativeExtension:
     """An extension module: what is compiled into it, and what Python sees of that.
 
     `folders` and `headers` are paths in a tree: all C sources of the folders are compiled, and the
-    headers, in order, are declared. `include` is the header that includes them all.
+    headers, in order, are declared.
     """
 
     module: str
     folders: tuple[str, ...]
     headers: tuple[str, ...]
-    include: str
     libraries: tuple[str, ...] = ()
 
     def files(self, tree: Path = ROOT) -> list[Path]:
@@ -69,7 +68,7 @@ class NativeExtension:
         files = [base / path.relative_to(home) for path in self.files(home)]
         builder.set_source(
             self.module,
-            f'#include "{self.include}"\n'
+            "".join(f'#include "{Path(header).name}"\n' for header in self.headers) + "\n"
             "static const char *native_source_hash(void)\n"
             f'{{\n    return "{self.source_hash(home)}";\n}}\n',
             sources=[str(path) for path in files if path.suffix == ".c"],
@@ -122,14 +121,13 @@ CORE_HEADERS = tuple(
     f"firmware_c/include/{name}.h"
     for name in (
         *("kan", "rcbf", "thermal", "calibration", "can_frame", "e2e", "codec", "monitor", "soc"),
-        *("history", "network", "bms"),
+        *("history", "network", "request", "bms"),
     )
 )
 FIRMWARE = NativeExtension(
     module="bms.firmware._firmware",
     folders=(*CORE_FOLDERS, *_core("image", "host")),
     headers=(*CORE_HEADERS, *_core("image/image.h", "host/host.h")),
-    include="host.h",
 )
 
 

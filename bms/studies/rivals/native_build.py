@@ -12,6 +12,5 @@ RIVALS = NativeExtension(
         f"{_NATIVE}/{name}.h"
         for name in ("linear", "mlp", "thermal", "covariance", "kalman", "rows")
     ),
-    include="rows.h",
     libraries=("m",),
 )

@@ -15,5 +15,4 @@ RUNNER = NativeExtension(
         *CORE_HEADERS,
         *(f"{_NATIVE}/{name}.h" for name in ("cell", "ecu_link", "baselines", "charge")),
     ),
-    include="charge.h",
 )
