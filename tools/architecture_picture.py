@@ -28,7 +28,7 @@ CORE = (
     (
         "bms   the ECU application",
         "network   monitor   calibration",
-        "kan   history   thermal   rcbf   soc",
+        "kan   history   thermal   rcbf   soc   request",
         "e2e   codec",
     ),
     ("generated/   what codegen writes",),

@@ -59,7 +59,8 @@ RequiredName = Literal[
 ]
 """Messages with content that the ECU has to receive, by identifier."""
 
-OptionalName = Literal["ChargeMode",]
+OptionalName = Literal["ChargeMode"]
+
 """Messages with content that it takes where they come, by identifier."""
 
 SentName = Literal[

@@ -1,7 +1,5 @@
 """Firmware ECUs that misbehave in one way."""
 
-from dataclasses import replace
-
 from bms.firmware import Ecu
 from bms.model import load_shipped_model
 
@@ -50,11 +48,12 @@ class OftenDamaged:
 class Contradicting:
     """The firmware, some of whose Identity messages after its first have other hashes."""
 
-    def __init__(self, preset, times):
+    def __init__(self, preset, times, is_of_this_version=True):
         self._ecu = Ecu(preset=preset)
         self.receive, self.step = self._ecu.receive, self._ecu.step
         self._sent = 0
         self._times = times
+        self._is_of_this_version = is_of_this_version
 
     def transmit(self):
         return [
@@ -64,19 +63,20 @@ class Contradicting:
     def _changed(self, frame_id, data):
         self._sent += frame_id == IDENTITY_ID
         is_changed = frame_id == IDENTITY_ID and 1 < self._sent <= 1 + self._times
-        return bytes(byte ^ 0xFF for byte in data) if is_changed else data
+        flipped = slice(0, 6) if self._is_of_this_version else slice(0, 8)
+        changed = bytes(byte ^ 0xFF for byte in data[flipped]) + data[flipped.stop :]
+        return changed if is_changed else data
 
 
 class HotterThanAllowed:
     """The firmware with temperature limits that are too high by some kelvin, and no identity."""
 
     def __init__(self, preset, excess_K):
-        limits = replace(
-            preset.limits,
-            max_core_temperature_K=preset.limits.max_core_temperature_K + excess_K,
-            max_surface_temperature_K=preset.limits.max_surface_temperature_K + excess_K,
-        )
-        self._ecu = Ecu(replace(preset, limits=limits), load_shipped_model(preset.name))
+        changes = {
+            name: getattr(preset.limits, name) + excess_K
+            for name in ("max_core_temperature_K", "max_surface_temperature_K")
+        }
+        self._ecu = Ecu(preset, load_shipped_model(preset.name), changes=changes)
         self.receive, self.step = self._ecu.receive, self._ecu.step
 
     def transmit(self):

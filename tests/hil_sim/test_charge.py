@@ -151,6 +151,16 @@ def test_an_ecu_that_says_twice_that_it_is_another_one_ends_the_run(preset):
         )
 
 
+def test_an_ecu_that_says_twice_that_its_frames_are_of_another_version_ends_the_run(preset):
+    with pytest.raises(BusError, match=r"version 253 of the CAN database.*; flash it anew"):
+        run_both(
+            Settings(preset, max_time_s=SHORT_S),
+            ecu_factory=lambda plant, database: Contradicting(
+                preset, times=2, is_of_this_version=False
+            ),
+        )
+
+
 def test_without_any_ecu_there_is_no_run(preset):
     with pytest.raises(BusError, match="no ECU answers"):
         run_both(

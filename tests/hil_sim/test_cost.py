@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 
 from bms.errors import InputError
 from bms.presets import load_preset
+from hil_sim.bus.buses import Frame
 from hil_sim.studies.cost.counting import count
 from hil_sim.studies.cost.measure import CostReport, measure_cost
 from hil_sim.studies.cost.records import State, counts, period, restart, state
@@ -138,8 +140,12 @@ def test_wrong_use_is_one_line(bms, tmp_path, monkeypatch):
 
 
 def test_records_hold_exactly_the_frames_of_a_period():
-    with pytest.raises(ValueError, match="4 frames, not 0"):
-        period([])
+    frames = [Frame(0x100 + i, bytes(8)) for i in range(5)]
+    for number in range(6):
+        assert len(period(frames[:number])) == len(period([]))
+        assert struct.unpack_from("<II", period(frames[:number]))[1] == number
+    with pytest.raises(ValueError, match="at most 5 frames, not 6"):
+        period([*frames, frames[0]])
 
 
 def test_ticks_of_the_timer_become_instructions():

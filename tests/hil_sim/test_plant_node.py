@@ -94,7 +94,7 @@ def test_a_repeated_or_corrupt_command_is_none(database):
 
     def corrupt(wire):
         frame = wire._command.frame({"CommandCurrent": -5.0})
-        wire.far.send(frame._replace(data=frame.data[:3] + bytes([frame.data[3] ^ 1])))
+        wire.far.send(frame._replace(data=flipped(frame.data, 3)))
 
     with Wire("virtual:repeat", database, repeat) as wire:
         assert wire.trusted().exchange().usable_command_A == pytest.approx(-5.0)
@@ -104,8 +104,15 @@ def test_a_repeated_or_corrupt_command_is_none(database):
         assert wire.node.command_counts == ReceptionCounts(0, 1, 1, 0, 0)
 
 
+COMMAND_LENGTH = 5
+
+
+def flipped(data, position):
+    return data[:position] + bytes([data[position] ^ 1]) + data[position + 1 :]
+
+
 def command_beside_a_damaged_one(wire):
-    wire.far.send(Frame(0x180, bytes(4)))
+    wire.far.send(Frame(0x180, bytes(COMMAND_LENGTH)))
     wire.command(-1.0 - len(wire.heard))
 
 

@@ -17,8 +17,8 @@ from tests.firmware.ports import built, needs_emulator
 pytestmark = needs_emulator
 
 OPEN, SYNC, FLAGS = b"S6\rO\r", b"t0800\r", b"F\r"
-COMMAND = b"t1804"
-COMMAND_LINE, FLAG_ANSWER = re.compile(rb"t1804\w{8}\r"), re.compile(rb"F0\d\r")
+COMMAND = b"t1805"
+COMMAND_LINE, FLAG_ANSWER = re.compile(rb"t1805\w{10}\r"), re.compile(rb"F0\d\r")
 LOSSES = re.compile(rb"t7F08([0-9A-F]{8})([0-9A-F]{8})\r")
 LINE_TIMEOUT_S = 10.0  # the machine may be busy
 
@@ -39,7 +39,9 @@ def said_until(line: socket.socket, end: re.Pattern[bytes]) -> bytes:
     """Everything up to a pattern; TimeoutError when it does not come."""
     text = b""
     while not end.search(text):
-        text += line.recv(1 << 16)
+        chunk = line.recv(1 << 16)
+        assert chunk, f"the board has gone after {text[-100:]!r}"
+        text += chunk
     return text
 
 

@@ -9,6 +9,7 @@ from bms.errors import InputError
 from bms.firmware import Ecu
 from bms.model.model_file import load_model, shipped_model_path
 from bms.presets import load_preset, preset_path
+from hil_sim.bus.catalog import NETWORK_VERSION
 from hil_sim.bus.database import load_codecs
 from hil_sim.logs import LogFrame, LogWriter, read_log
 from hil_sim.logs.recorder import Recorder
@@ -111,8 +112,11 @@ def test_foreign_frames_change_nothing(tmp_path):
         (lambda frames: without(SYNC)(frames)[500:], "begins in the middle of a run"),
         (lambda frames: frames[:-1], "cut off in the middle of a control period"),
         (without(IDENTITY), "no Identity"),
+        (lambda frames: [f._replace(data=bytes(7) + bytes([NETWORK_VERSION]))
+                         if f.frame_id == IDENTITY else f for f in frames],
+         "preset of hash 0000..."),
         (lambda frames: [f._replace(data=bytes(8)) if f.frame_id == IDENTITY else f
-                         for f in frames], "preset of hash 0000..."),
+                         for f in frames], "recorded with version 1 of the CAN database"),
         (lambda frames: [f._replace(data=bytes(4) + f.data[4:]) if f.frame_id == IDENTITY else f
                          for f in frames], "model of hash 00000000..."),
         (lambda frames: frames[::-1], None),
