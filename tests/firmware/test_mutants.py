@@ -75,7 +75,7 @@ MUTANTS = [
     Mutant("a charge ends when complete", "bms.c", "bms->state = BMS_COMPLETE;", "bms->state = BMS_CHARGING;", STATES, "complete"),
     Mutant("the command is counted too", "soc.c", "? state->commanded.soc", "? state->measured.soc", STATES, "counted"),
     Mutant("a fault outlives its symptom", "monitor.c", "monitor->latched |= bit;", "monitor->latched = bit & symptoms;", FAULTS, "whatever_other"),
-    Mutant("commands are rounded towards zero", "codec.c", "(value < 0.0f) ? (1.0f", "(value > 0.0f) ? (1.0f", "tests/firmware/test_codec.py", "towards_zero"),
+    Mutant("commands are rounded towards zero", "codec.c", "(rounding == CODEC_TOWARDS_ZERO) ? STEP_TOLERANCE : 0.5f", "0.5f", "tests/firmware/test_codec.py", "towards_zero"),
 ]  # fmt: skip
 
 
