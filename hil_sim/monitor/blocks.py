@@ -8,7 +8,13 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from hil_sim.bus.catalog import ActiveConstraint, CommandState, OptionalName, ReportedState
+from hil_sim.bus.catalog import (
+    ActiveConstraint,
+    CommandState,
+    Message,
+    OptionalName,
+    ReportedState,
+)
 from hil_sim.monitor import wording
 from hil_sim.monitor.model import MOST_COUNTED, ReceiverReport, Snapshot
 from hil_sim.monitor.presets import PresetInForce
@@ -24,6 +30,8 @@ _OTHER_STATE_STYLE = "black on white"
 _RECEIVER_STYLES = {ReportedState.VALID.label: "green", ReportedState.INVALID.label: "red"}
 _NOT_LIMITING = (ActiveConstraint.NONE.label, ActiveConstraint.INVALID.label, wording.NOT_AVAILABLE)
 _WRONG = "bold red"
+# What an undisturbed charge does without takes no room until it comes.
+_SELDOM = (*get_args(OptionalName), Message.BOOT_REFUSAL)
 
 
 def header(snapshot: Snapshot, bus: str) -> Table:
@@ -123,6 +131,8 @@ def messages(snapshot: Snapshot) -> Table:
     table.add_column("age", justify="right", no_wrap=True, min_width=6)
     table.add_column("bad", justify="right", no_wrap=True, min_width=4)
     for message in snapshot.messages:
+        if message.age_s is None and message.name in _SELDOM:
+            continue
         rate, age = _rate_and_age(message)
         refused = Text(str(message.refused), _WRONG if message.refused else "")
         table.add_row(f"{message.frame_id:03X}", message.name, rate, age, refused)
@@ -146,6 +156,8 @@ def receivers(snapshot: Snapshot) -> Table:
     for heading in ("crc", "len", "rep", "lost", "reord"):
         table.add_column(heading, justify="right", no_wrap=True)
     for report in snapshot.receivers:
+        if report.state in (None, ReportedState.NO_DATA.label) and report.name in _SELDOM:
+            continue
         table.add_row(f"{report.frame_id:03X}", _receiver_state(report), *_counts(report))
     return table
 

@@ -15,6 +15,8 @@ from hil_sim.monitor.model import Snapshot
 from hil_sim.monitor.presets import PresetInForce
 
 _ROOMY_WIDTH, _ROOMY_HEIGHT = 100, 34
+_FULL_HEIGHT = 24
+"""Rows that the compact screen of a charge fills to the last."""
 _HEADER_ROWS, _GAUGE_ROWS, _DECISION_ROWS, _RECEIVER_ROWS, _FOREIGN_ROWS = 2, 5, 3, 5, 2
 _FRAME = 2
 _MESSAGES_WIDTH = 43
@@ -31,9 +33,9 @@ class Screen:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         height = options.height or console.size.height
         is_roomy = options.max_width >= _ROOMY_WIDTH and height >= _ROOMY_HEIGHT
-        yield self._layout(is_roomy)
+        yield self._layout(is_roomy, not is_roomy and height > _FULL_HEIGHT)
 
-    def _layout(self, is_roomy: bool) -> Layout:
+    def _layout(self, is_roomy: bool, has_gap: bool) -> Layout:
         parts = self._parts()
         has_remark = bool(self.in_force.remark)
         frame = _FRAME if is_roomy else 0
@@ -61,7 +63,7 @@ class Screen:
             Layout(parts["header"], size=_HEADER_ROWS + has_remark),
             area("cell", _GAUGE_ROWS),
             # Without frames an empty line sets the tables apart, where there is room for it.
-            area("decision", _DECISION_ROWS + (not is_roomy and not has_remark)),
+            area("decision", _DECISION_ROWS + has_gap),
             bottom,
         )
         return screen

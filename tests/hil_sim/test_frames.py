@@ -17,9 +17,10 @@ from hil_sim.run.settings import Settings
 DATABASE = cantools.database.load_string(
     files("codegen").joinpath("can/bms.dbc").read_text(), "dbc"
 )
+CHARGE_MODE = 4  # as it is reported
 PLANT = ["CellElectrical", "CellThermal", "Coolant", "ChargeRequest", "SYNC"]
 ECU = ["Estimate", "Decision", "DecisionMargins", "Diagnostics", "ChargeCommand"]
-NOW_AND_THEN = ["Identity", "NetworkDiagnostics"]
+NOW_AND_THEN = ["Identity", "NetworkDiagnostics", "Diagnostics2"]
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +111,10 @@ def test_no_fault_is_reported(periods):
 
 def test_every_message_of_an_undisturbed_run_is_reported_as_valid_without_a_count(periods):
     reports = [p["NetworkDiagnostics"] for p in periods if "NetworkDiagnostics" in p]
-    assert [r["ReportedMessage"] for r in reports[:8]] == [0, 1, 2, 3, 0, 1, 2, 3]
-    assert {r["ReportedState"] for r in reports[1:]} == {2}
+    assert [r["ReportedMessage"] for r in reports[:10]] == [0, 1, 2, 3, 4, 0, 1, 2, 3, 4]
+    needed = [r["ReportedState"] for r in reports[1:] if r["ReportedMessage"] != CHARGE_MODE]
+    optional = [r["ReportedState"] for r in reports if r["ReportedMessage"] == CHARGE_MODE]
+    assert set(needed) == {2}
+    assert set(optional) == {0}  # nobody has sent it
     counts = ("WrongCrcFrames", "WrongLengthFrames", "RepeatedFrames", "LostFrames")
     assert {r[name] for r in reports for name in (*counts, "ReorderedFrames")} == {0}

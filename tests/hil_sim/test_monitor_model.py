@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from bms.presets import load_preset
 from hil_sim.bus.buses import Frame
+from hil_sim.bus.catalog import NETWORK_VERSION
 from hil_sim.bus.e2e import Sender
 from hil_sim.bus.identity import Identity
 from hil_sim.monitor.listener import ForeignFrame
@@ -114,13 +115,13 @@ def test_each_report_of_the_ecu_stands_until_its_turn_did_not_come_three_times(f
             ReportedState=2 if number else 3,
             **{f"{name}Frames": count for name, count in zip(names, counts)},
         )
-    electrical, thermal, coolant, _ = feed.model.snapshot(1.0).receivers
+    electrical, thermal, coolant, *_ = feed.model.snapshot(1.0).receivers
     assert (electrical.name, electrical.frame_id) == ("CellElectrical", 0x100)
     assert (electrical.state, electrical.counts) == ("Invalid", (1, 2, 3, 4, 255))
     assert (coolant.state, coolant.counts) == ("Valid", (0, 0, 0, 0, 0))
     assert thermal.state is None
-    is_stale = [report.is_stale for report in feed.model.snapshot(6.5).receivers]
-    assert is_stale == [True, False, False, False]
+    is_stale = [report.is_stale for report in feed.model.snapshot(8.0).receivers]
+    assert is_stale == [True, False, False, False, False]
 
 
 def test_foreign_frames_are_counted_by_kind_and_identifier(feed):
@@ -158,7 +159,7 @@ LIN2014, PAPER = load_preset("lin2014"), load_preset("paper_calibrated")
 
 
 def identity(digits):
-    return Identity(firmware_version=1, model_hash="12345678", preset_hash=digits)
+    return Identity(NETWORK_VERSION, firmware_version=1, model_hash="12345678", preset_hash=digits)
 
 
 @pytest.mark.parametrize(

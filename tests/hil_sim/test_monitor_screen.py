@@ -19,6 +19,7 @@ from hil_sim.monitor.status_line import status_line
 from tests.hil_sim.golden.record import FOLDER
 from tests.hil_sim.monitor_picture import PICTURE, drawn, picture, snapshot_of
 
+SELDOM = ("ChargeMode", "BootRefusal")  # neither is sent in a charge of today's plant
 SIZES = [(80, 24), (120, 40), (200, 24), (80, 60)]
 
 
@@ -60,8 +61,12 @@ def test_everything_is_on_the_screen(charging, database, size):
         "q quits",
     ):
         assert re.search(pattern, text), pattern
+    rates = {"Identity": "1.0", "NetworkDiagnostics": "2.0", "Diagnostics2": "2.0"}
     for codec in database.values():
-        rate = {"Identity": "1.0", "NetworkDiagnostics": "2.0"}.get(codec.name, "10.0")
+        if codec.name in SELDOM:
+            assert codec.name not in text
+            continue
+        rate = rates.get(codec.name, "10.0")
         assert re.search(rf"{codec.frame_id:03X} {codec.name} +{rate} +0\.\d\d s +0\b", text)
     for identifier in range(0x100, 0x104):
         assert re.search(rf"{identifier:03X} Valid( +0){{5}}", text)
@@ -96,8 +101,18 @@ def test_the_four_faults_of_a_plant_that_is_gone_are_all_on_the_screen(database,
 def test_what_came_and_comes_no_more_is_stale(size):
     text = text_of(snapshot_of(FOLDER / "hot_derating.log.gz", 25.0, age_s=200.0), *size)
     assert re.search(r" Derated +stale +socketcan:vcan0 +silent for 3 min", text)
-    assert text.count("stale") == 1 + 5 + 3 + 12 + 4 + 3
+    assert text.count("stale") == 1 + 5 + 3 + 13 + 4 + 3
     assert "━" not in text
+
+
+@pytest.mark.parametrize("size", [size for size in SIZES if size[1] > 24])
+def test_what_seldom_comes_has_its_row_when_it_has_come(database, size):
+    model = SystemModel(database)
+    for name in SELDOM:
+        model.take(0.0, Sender(database[name]).frame({}))
+    text = text_of(model.snapshot(0.0), *size)
+    for name in SELDOM:
+        assert f"{database[name].frame_id:03X} {name}" in text
 
 
 @pytest.mark.parametrize("size", SIZES)
