@@ -15,7 +15,10 @@ EXTENSION_BUILD := setup.py tools/native_extensions.py bms/native_build.py \
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 PYTEST := $(BIN)/python -m pytest -n 2
 # What `make quick` tries: the C core, and of Python what is nearest to it.
-QUICK_TESTS ?= tests/firmware tests/codegen tests/bms
+QUICK_TESTS ?= $(foreach test, calibration_choice charge_mode codec codec_messages e2e ecu_faults ecu_loop ecu_states history \
+    image_check kan rcbf reception slcan soc structure supervision thermal, tests/firmware/test_$(test).py) \
+  tests/codegen/test_generated.py $(foreach test, barrier_constants model_file presets, tests/bms/test_$(test).py) \
+  $(foreach test, database plant_node replay_golden, tests/hil_sim/test_$(test).py)
 
 .PHONY: help build run quick test lint generate models verify-tables long-checks fuzz fuzz-frames fuzz-logs benchmark docs clean
 .DEFAULT_GOAL := help

@@ -202,6 +202,7 @@ def test_a_calibration_that_the_firmware_refuses_is_a_fault_for_good() -> None:
             assert (bench.state, bench.command_A, bench.latched()) == ("Fault", 0.0, {18})
 
 
+@pytest.mark.slow
 def test_no_current_while_a_fault_is_latched_whatever_other_symptom_comes() -> None:
     one_each = list({case.fault: case for case in CASES}.values())
     for first, second in combinations(one_each, 2):

@@ -37,6 +37,7 @@ def box_points(network: Network, count: int, seed: int) -> np.ndarray:
     return np.asarray(network.input_center) + unit * np.asarray(network.input_half_range)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", PRESETS)
 def test_c_and_python_agree_over_the_box_and_its_faces(preset: str) -> None:
     model = load_shipped_model(preset)

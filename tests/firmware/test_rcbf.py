@@ -54,6 +54,7 @@ def solve(firmware: Firmware, state: dict[str, float]) -> Decision:
     return firmware.solve(**state)
 
 
+@pytest.mark.slow
 def test_decision_equals_osqp_on_the_interval_form(firmware: Firmware) -> None:
     solver = osqp.OSQP()
     one = sparse.csc_matrix([[1.0]])
@@ -79,6 +80,7 @@ def test_decision_equals_osqp_on_the_interval_form(firmware: Firmware) -> None:
     assert feasible > STATES / 4
 
 
+@pytest.mark.slow
 def test_decision_equals_slsqp_on_the_raw_constraints(firmware: Firmware) -> None:
     checked = 0
     for state in random_states(2, STATES):

@@ -79,6 +79,7 @@ def test_before_the_first_reading_nothing_is_too_cold(name: str) -> None:
     assert lib.thermal_coldest_surface_K(fresh, prediction.constants) < -1e30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PRESETS)
 def test_undisturbed_prediction_is_the_surface_itself(name: str) -> None:
     preset = load_preset(name)
@@ -88,6 +89,7 @@ def test_undisturbed_prediction_is_the_surface_itself(name: str) -> None:
     assert excess_K == pytest.approx(np.full((2, 1), bound_K), abs=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PRESETS)
 def test_nothing_within_the_modelled_uncertainty_reads_as_a_deficit(name: str) -> None:
     """All corners of disturbance and sensor errors at once, from a start that was misread, too."""
