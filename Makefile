@@ -93,8 +93,7 @@ clean: ## Remove everything that set-up, build and runs have made
 .venv/runtime: pyproject.toml constraints.txt setup.py
 	tools/check_machine.sh "$(PYTHON)"
 	test -x $(BIN)/python || "$(PYTHON)" -m venv .venv
-	# The resolver of pip 23, which comes with Python 3.11, does not end on the extra for the tests.
-	$(INSTALL) --upgrade pip setuptools wheel cffi
+	$(INSTALL) setuptools wheel cffi
 	$(INSTALL) --no-build-isolation --editable .
 	touch $@
 
