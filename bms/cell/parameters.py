@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
+from annotated_types import MaxLen
 
 from bms.arrays import Array
+from bms.cell.interval import CellInterval
+from bms.cell.tables import Branch, EntropyTable, ResistanceTable
 from bms.errors import InputError
-from bms.validation import Finite, Positive, strict
+from bms.validation import Finite, NonNegative, Positive, strict
 
 SECONDS_PER_HOUR = 3600.0
 
@@ -26,6 +30,8 @@ class OpenCircuitVoltage:
 
     soc: tuple[Finite, ...]
     voltage_V: tuple[Finite, ...]
+    overfill_slope_V: NonNegative = 0.0
+    """Rise of the voltage by a whole state of charge beyond 1, so that overfilling is seen."""
 
     def __post_init__(self) -> None:
         if len(self.soc) != len(self.voltage_V) or len(self.soc) < 2:
@@ -36,8 +42,12 @@ class OpenCircuitVoltage:
             raise InputError("cell.ocv: soc and voltage_V must both rise strictly")
 
     def __call__(self, soc: npt.ArrayLike) -> Array:
-        """Voltage in V at a state of charge of any shape; held constant outside 0..1."""
-        return np.interp(np.asarray(soc, dtype=np.float64), self.soc, self.voltage_V)
+        """Voltage in V at a state of charge of any shape; constant below 0, a slope beyond 1."""
+        charge = np.asarray(soc, dtype=np.float64)
+        within = np.interp(charge, self.soc, self.voltage_V)
+        if self.overfill_slope_V == 0.0:
+            return within
+        return within + self.overfill_slope_V * np.maximum(charge - 1.0, 0.0)
 
     def soc_at(self, voltage_V: npt.ArrayLike) -> Array:
         """State of charge at which the voltage (V) is reached; 0 below and 1 above the table."""
@@ -66,7 +76,7 @@ class CellParameters:
     """Lumped electro-thermal parameters of one cell with its coolant (paper, cell model).
 
     The entropic coefficient is dU/dT: with a current that is negative while charging, a positive
-    value heats the core during charge.
+    value heats the core during charge. A table or branches that are absent leave the constant.
     """
 
     capacity_Ah: Positive
@@ -78,6 +88,10 @@ class CellParameters:
     ohmic_resistance_ohm: Positive
     entropic_coefficient_V_per_K: Finite
     ocv: OpenCircuitVoltage
+    resistance: ResistanceTable | None = None
+    branches: Annotated[tuple[Branch, ...], MaxLen(3)] = ()
+    entropy: EntropyTable | None = None
+    interval: CellInterval | None = None
 
     @cached_property
     def capacity_As(self) -> float:

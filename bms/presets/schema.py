@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Le, MultipleOf
 
@@ -40,6 +41,8 @@ class Gains:
     """Barrier gains: 1 for SoC, 2 for the core, 3 and 4 for the surface (s^2 + a4 s + a3).
 
     An absent core gain means 1/(Rc Cc), at which the estimate drops out of the core constraint.
+    The surface condition takes the slope of the surface disturbance into account as the paper does,
+    or, without assuming one, the disturbance's own worst case in the chain (docs/theory.md).
     Raises InputError unless the surface polynomial is Hurwitz with real roots, because only then
     is the chain dB/dt + lambda B itself a barrier.
     """
@@ -48,6 +51,7 @@ class Gains:
     alpha3_per_s2: Positive
     alpha4_per_s: Positive
     alpha2_per_s: Positive | None = None
+    surface_condition: Literal["paper", "worst-case"] = "paper"
 
     def __post_init__(self) -> None:
         if self.alpha4_per_s**2 < 4.0 * self.alpha3_per_s2:
@@ -66,13 +70,27 @@ class Gains:
 @strict
 @dataclass(frozen=True)
 class Uncertainty:
-    """Bounds on the disturbance of each rate, and on the slope of the surface disturbance."""
+    """Bounds on the disturbance of each rate, and on the slope of the surface disturbance.
+
+    That of the core may grow with the current u: core + core_per_A |u| + core_per_A2 u^2.
+    """
 
     soc_per_s: NonNegative
     core_K_per_s: NonNegative
     surface_K_per_s: NonNegative
     coolant_K_per_s: NonNegative
     surface_rate_K_per_s2: NonNegative
+    core_K_per_As: NonNegative = 0.0
+    core_K_per_A2s: NonNegative = 0.0
+
+    def core_at_K_per_s(self, current_A: Any) -> Any:
+        """Bound on the core's disturbance in K/s at a current in A; floats or arrays."""
+        strength_A = abs(current_A)
+        return (
+            self.core_K_per_s
+            + self.core_K_per_As * strength_A
+            + self.core_K_per_A2s * strength_A * strength_A
+        )
 
 
 @strict
@@ -129,6 +147,67 @@ class Initial:
     cooling_power_W: NonNegative
 
 
+@strict
+@dataclass(frozen=True)
+class PlugIn:
+    """How far the state at plug-in may be from what the charger says, and from rest.
+
+    The coolant may be warmer or colder than the cell by coolant_offset_K, the core warmer than the
+    surface by core_excess_K. Branches may hold a polarisation of polarisation_V either way.
+    """
+
+    soc_error: NonNegative = 0.0
+    coolant_offset_K: NonNegative = 0.0
+    core_excess_K: NonNegative = 0.0
+    polarisation_V: NonNegative = 0.0
+
+
+@strict
+@dataclass(frozen=True)
+class Supply:
+    """The charger as it is: its current is a command's times 1 +- tolerance, after a lag."""
+
+    tolerance: Annotated[float, Ge(0.0), Le(0.2)] = 0.0
+    lag_s: Annotated[float, Ge(0.0), Le(10.0)] = 0.0
+
+
+@strict
+@dataclass(frozen=True)
+class CurrentMap:
+    """Strongest charging current over temperature and state of charge, linear between the points.
+
+    A row of `largest_A` belongs to a temperature, a column to a state of charge; beyond the map its
+    edge holds. Raises InputError unless the axes rise strictly, and the current does not rise with
+    the state of charge nor fall with the temperature: so a cold surface and the fullest possible
+    charge are the worst of what is not known exactly.
+    """
+
+    temperature_K: tuple[Positive, ...]
+    soc: tuple[Finite, ...]
+    largest_A: tuple[tuple[NonNegative, ...], ...]
+
+    def __post_init__(self) -> None:
+        for name, axis in (("temperature_K", self.temperature_K), ("soc", self.soc)):
+            if len(axis) < 2 or not all(low < high for low, high in itertools.pairwise(axis)):
+                raise InputError(f"current_map.{name}: must rise strictly, from at least 2 points")
+        if len(self.largest_A) != len(self.temperature_K) or any(
+            len(row) != len(self.soc) for row in self.largest_A
+        ):
+            raise InputError(
+                "current_map.largest_A: needs a row for each temperature_K, a number for each soc"
+            )
+        by_soc = (pair for row in self.largest_A for pair in zip(row[1:], row))
+        by_temperature = (
+            pair
+            for colder, warmer in itertools.pairwise(self.largest_A)
+            for pair in zip(colder, warmer)
+        )
+        if not all(low <= high for pairs in (by_soc, by_temperature) for low, high in pairs):
+            raise InputError(
+                "current_map.largest_A: must not rise along a row nor fall from row to row"
+            )
+
+
 Range = tuple[Finite, Finite]
 
 
@@ -177,6 +256,9 @@ class Preset:
     sensors: Sensors
     initial: Initial
     operating_box: OperatingBox
+    plug_in: PlugIn = PlugIn()
+    supply: Supply = Supply()
+    current_map: CurrentMap | None = None
 
     def __post_init__(self) -> None:
         for key, values, (lowest, highest) in self._on_the_bus():
@@ -213,6 +295,7 @@ class Preset:
         """
         cell, sensors = plain(self.cell), plain(self.sensors)
         del cell["ocv"], sensors["voltage_V"]
+        cell.pop("interval", None)
         return digest(
             {
                 "cell": cell,
