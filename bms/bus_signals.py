@@ -19,6 +19,7 @@ class BusQuantisation:
     """
 
     current_A: float = 0.001
+    voltage_V: float = 0.00005
     surface_temperature_K: float = 0.0025
     coolant_temperature_K: float = 0.0025
     cooling_power_W: float = 0.0005

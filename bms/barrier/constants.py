@@ -49,7 +49,6 @@ def barrier_constants(cell: CellParameters, preset: Preset) -> BarrierConstants:
     rs, cs = cell.surface_resistance_K_per_W, cell.surface_heat_capacity_J_per_K
     cinf = cell.coolant_heat_capacity_J_per_K
     alpha3, alpha4 = preset.gains.alpha3_per_s2, preset.gains.alpha4_per_s
-    bounds = preset.uncertainty
     a4 = 1 / (rc**2 * cc * cs) + 1 / (rc**2 * cs**2) + 1 / (rc * rs * cs**2) - alpha4 / (rc * cs)
     a6 = 1 / (rc * rs * cs**2) + 1 / (rs**2 * cs**2) + 1 / (rs**2 * cs * cinf) - alpha4 / (rs * cs)
     return BarrierConstants(
@@ -63,8 +62,26 @@ def barrier_constants(cell: CellParameters, preset: Preset) -> BarrierConstants:
         a8_per_As2=cell.entropic_coefficient_V_per_K / (rc * cc * cs),
         a9_K_per_A2s2=-cell.ohmic_resistance_ohm / (rc * cc * cs),
         a10_K_per_Ws2=1 / (rs * cs * cinf),
-        delta4_K_per_s2=bounds.core_K_per_s / (rc * cs)
-        + abs(1 / (rc * cs) + 1 / (rs * cs) - alpha4) * bounds.surface_K_per_s
-        + bounds.coolant_K_per_s / (rs * cs)
-        + bounds.surface_rate_K_per_s2,
+        delta4_K_per_s2=_surface_reserve_K_per_s2(cell, preset),
     )
+
+
+def _surface_reserve_K_per_s2(cell: CellParameters, preset: Preset) -> Any:
+    """Delta4: what disturbances can take from the surface condition.
+
+    In the paper's form the chain contains the surface disturbance itself, so that its slope counts;
+    in the other form the chain has the disturbance's worst case in it (docs/theory.md).
+    """
+    gains, bounds = preset.gains, preset.uncertainty
+    from_core = 1 / (cell.core_resistance_K_per_W * cell.surface_heat_capacity_J_per_K)
+    from_coolant = 1 / (cell.surface_resistance_K_per_W * cell.surface_heat_capacity_J_per_K)
+    others = bounds.core_K_per_s * from_core + bounds.coolant_K_per_s * from_coolant
+    own_per_s = from_core + from_coolant
+    if gains.surface_condition == "paper":
+        return (
+            others
+            + abs(own_per_s - gains.alpha4_per_s) * bounds.surface_K_per_s
+            + bounds.surface_rate_K_per_s2
+        )
+    first_per_s, second_per_s = gains.surface_roots_per_s
+    return others + (abs(own_per_s - first_per_s) + second_per_s) * bounds.surface_K_per_s

@@ -45,17 +45,20 @@ def heat_range_W(cell: CellParameters, preset: Preset) -> Interval:
     )
 
 
-def largest_rate(cell: CellParameters, preset: Preset, weights: Weights) -> Any:
+def largest_rate(
+    cell: CellParameters, preset: Preset, weights: Weights, heat_W: Interval | None = None
+) -> Any:
     """Largest d/dt of the weighted sum of temperatures, in K/s times the weights' unit.
 
     Holds from a start at rest (all temperatures equal) for every current from the reference to
-    0 A, every cooling power of the operating box and every disturbance within its bounds.
+    0 A, or every heat of a range that is given instead, every cooling power of the operating box
+    and every disturbance within its bounds.
     """
     rc, cc = cell.core_resistance_K_per_W, cell.core_heat_capacity_J_per_K
     rs, cs = cell.surface_resistance_K_per_W, cell.surface_heat_capacity_J_per_K
     cinf = cell.coolant_heat_capacity_J_per_K
     bounds = preset.uncertainty
-    heat = heat_range_W(cell, preset)
+    heat = heat_range_W(cell, preset) if heat_W is None else heat_W
     cooling_high_W = preset.operating_box.cooling_power_W[1]
 
     # A disturbance of a rate acts like heat in that node; 0 W, the state at rest, is in each range.

@@ -14,6 +14,7 @@ import numpy as np
 
 from bms.barrier import barrier_constants, sampling_margins
 from bms.barrier.surface_prediction import surface_prediction
+from bms.calibration.family_block import family_fields
 from bms.calibration.plausibility import plausibility_fields
 from bms.errors import InputError
 from bms.model.model_file import KanModel
@@ -21,7 +22,7 @@ from bms.model.pair import check_pair
 from bms.presets import Preset
 from bms.tables.network_tables import network_tables
 
-LAYOUT = 3
+LAYOUT = 4
 """Layout number of bms_calibration_t that this module fills (BMS_CALIBRATION_LAYOUT)."""
 MAX_OCV_POINTS = 64
 
@@ -53,6 +54,7 @@ def calibration_fields(
         "rcbf": _barrier_fields(preset, model.error_bound_K),
         "plausibility": plausibility_fields(preset),
         "thermal": _thermal_fields(preset),
+        "family": family_fields(preset),
         "kan": network_tables(model.network).fields(model.network, preset.timing.sampling_period_s),
     }
     for name, value in changes.items():

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from bms.bus_signals import RANGES
+from bms.bus_signals import BUS, RANGES
 from bms.errors import InputError
 from bms.presets import Preset
 
@@ -82,4 +82,14 @@ def plausibility_fields(preset: Preset) -> dict[str, Any]:
                 f"preset '{preset.name}': {key}: {value:.10g} leaves no room on the CAN signal for "
                 f"readings that cannot be, which begin at {high:.10g} of {highest:.10g}; lower it"
             )
-    return {name: {"low": low, "high": high} for name, (low, high) in ranges.items()} | _DEVIATIONS
+    sensors, half_step = preset.sensors, BUS
+    errors = {
+        "reading_error": [
+            sensors.current_A.error_bound + half_step.current_A,
+            sensors.cooling_power_W.error_bound + half_step.cooling_power_W,
+            sensors.surface_temperature_K.error_bound + half_step.surface_temperature_K,
+            sensors.coolant_temperature_K.error_bound + half_step.coolant_temperature_K,
+        ]
+    }
+    believed = {name: {"low": low, "high": high} for name, (low, high) in ranges.items()}
+    return believed | _DEVIATIONS | errors

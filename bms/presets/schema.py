@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -59,6 +60,13 @@ class Gains:
                 "gains: alpha4_per_s^2 must be at least 4 alpha3_per_s2 (real roots); "
                 "raise alpha4_per_s or lower alpha3_per_s2"
             )
+
+    @property
+    def surface_roots_per_s(self) -> tuple[float, float]:
+        """Rates of the surface chain psi = B' + first B, psi' + second psi >= 0, larger first."""
+        root = math.sqrt(max(self.alpha4_per_s**2 - 4.0 * self.alpha3_per_s2, 0.0))
+        larger_per_s = 0.5 * (self.alpha4_per_s + root)
+        return larger_per_s, self.alpha3_per_s2 / larger_per_s
 
     def core_gain_per_s(self, cell: CellParameters) -> float:
         """The core gain in force in 1/s."""

@@ -11,7 +11,7 @@
 #include "calibration.h"
 
 const bms_calibration_t BMS_DEFAULT_CALIBRATION = {
-    .layout = 3u,
+    .layout = 4u,
     .model_hash = 1213589250u,
     .preset_hash = 2851565796u,
     .sampling_period_s = 0.100000001f,
@@ -98,6 +98,9 @@ const bms_calibration_t BMS_DEFAULT_CALIBRATION = {
         .voltage_overshoot_V = 0.0500000007f,
         .temperature_overshoot_K = 2.0f,
         .surface_deficit_K = 1.0f,
+        .reading_error = {
+            0.0234999992f, 0.0109999999f, 0.0274999999f, 0.0274999999f,
+        },
     },
     .thermal = {
         .transition = {
@@ -112,6 +115,9 @@ const bms_calibration_t BMS_DEFAULT_CALIBRATION = {
         .ohmic_resistance_ohm = 0.0125230001f,
         .entropic_coefficient_V_per_K = 5.79619991e-05f,
         .error_bound_K = 0.202184826f,
+    },
+    .family = {
+        .is_stated = 0u,
     },
     .kan = {
         .layers = 2u,

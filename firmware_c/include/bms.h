@@ -12,6 +12,7 @@
 #include "calibration.h"
 #include "can_frame.h"
 #include "codec.h"
+#include "family.h"
 #include "history.h"
 #include "kan.h"
 #include "monitor.h"
@@ -54,6 +55,7 @@ typedef struct {
     thermal_t thermal;
     float coolant_temperature_K; /* last usable reading */
     float surface_temperature_K; /* measured, but no colder than the heat allows */
+    family_t family;
     monitor_t monitor;
     kan_estimate_t estimate;
     rcbf_decision_t decision;

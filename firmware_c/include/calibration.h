@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "family.h"
 #include "kan.h"
 #include "rcbf.h"
 #include "thermal.h"
@@ -14,7 +15,7 @@ extern "C" {
 #endif
 
 /* Raised whenever the layout of bms_calibration_t or of one of its parts changes. */
-#define BMS_CALIBRATION_LAYOUT 3
+#define BMS_CALIBRATION_LAYOUT 4
 
 typedef struct {
     float low;
@@ -33,6 +34,7 @@ typedef struct {
     float voltage_overshoot_V;  /* over the limit, before it is a fault */
     float temperature_overshoot_K;
     float surface_deficit_K; /* below the coldest that the heat allows, before it is a fault */
+    float reading_error[4];  /* of the estimator's measured inputs, in their order */
 } plausibility_t;
 
 typedef struct {
@@ -46,6 +48,7 @@ typedef struct {
     rcbf_constants_t rcbf;
     plausibility_t plausibility;
     thermal_constants_t thermal;
+    family_constants_t family;
     kan_model_t kan;
 } bms_calibration_t;
 

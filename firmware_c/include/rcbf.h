@@ -73,7 +73,9 @@ typedef enum {
     RCBF_CORE = 3,
     RCBF_SURFACE = 4,
     RCBF_INFEASIBLE = 5,
-    RCBF_INVALID = 6
+    RCBF_INVALID = 6,
+    RCBF_MAP = 7,         /* the current map */
+    RCBF_CORE_UNKNOWN = 8 /* it is not known yet how hot the core can be */
 } rcbf_active_t;
 
 typedef struct {

@@ -20,6 +20,9 @@ typedef struct {
     float soc; /* the fuller of the two */
 } soc_t;
 
+/* Adds a change, and what earlier ones lost. */
+void soc_add(soc_counter_t *counter, float change);
+
 void soc_set(soc_t *state, float soc);
 
 /* Counts one period of constant currents (negative while charging). */

@@ -49,6 +49,7 @@ void bms_init(bms_t *bms, const bms_config_t *config)
     *bms = (bms_t){ .state = BMS_INIT, .estimate = { NAN, false }, .decision = NO_DECISION };
     monitor_reset(&bms->monitor);
     history_reset(&bms->history);
+    family_reset(&bms->family);
     thermal_reset(&bms->thermal);
     if ((config != NULL) && (config->calibration != NULL) &&
         calibration_is_valid(config->calibration)) {
@@ -76,6 +77,83 @@ static uint32_t symptoms_of_missing_messages(const bms_t *bms)
     return symptoms;
 }
 
+static bool has_family(const bms_t *bms)
+{
+    return bms->calibration->family.is_stated != 0u;
+}
+
+/* What the readings say, and what is in force while they are taken. */
+static family_reading_t reading_of(const bms_t *bms)
+{
+    const codec_measurement_t *m = &bms->measurement;
+    const plausibility_t *limits = &bms->calibration->plausibility;
+    return (family_reading_t){
+        .current_A = m->current_A,
+        .voltage_V = m->voltage_V,
+        .surface_temperature_K = bms->surface_temperature_K,
+        .coolant_temperature_K = m->coolant_temperature_K,
+        .estimated_core_K = bms->estimate.in_domain ? bms->estimate.core_temperature_K : NAN,
+        .command_A = bms->command_A,
+        .is_usable = is_usable(bms, CAN_RECEIVED_CELL_ELECTRICAL) &&
+                     is_usable(bms, CAN_RECEIVED_CELL_THERMAL) &&
+                     !is_outside(m->current_A, &limits->current_A) &&
+                     !is_outside(m->voltage_V, &limits->voltage_V) &&
+                     !is_outside(m->surface_temperature_K, &limits->surface_temperature_K) &&
+                     !is_outside(m->coolant_temperature_K, &limits->coolant_temperature_K),
+        .is_charging = is_charging(bms),
+    };
+}
+
+static bool current_deviates(const bms_t *bms)
+{
+    const bms_calibration_t *calibration = bms->calibration;
+    const float current_A = bms->measurement.current_A;
+    const float deviation_A = calibration->plausibility.current_deviation_A;
+    if (has_family(bms)) {
+        return !family_supply_is_plausible(&bms->family, &calibration->family, current_A,
+                                           deviation_A);
+    }
+    return numeric_abs(current_A - bms->command_A) > deviation_A;
+}
+
+static bool voltage_deviates(const bms_t *bms)
+{
+    const bms_calibration_t *calibration = bms->calibration;
+    const codec_measurement_t *m = &bms->measurement;
+    const rcbf_constants_t *cell = &calibration->rcbf;
+    const float deviation_V = calibration->plausibility.voltage_deviation_V;
+    if (has_family(bms)) {
+        const family_reading_t reading = reading_of(bms);
+        return !family_voltage_is_plausible(&bms->family, &calibration->family, cell, &reading,
+                                            deviation_V);
+    }
+    const float model_V = rcbf_open_circuit_voltage_V(cell, bms->soc.soc) -
+                          m->current_A * cell->ohmic_resistance_ohm;
+    return numeric_abs(m->voltage_V - model_V) > deviation_V;
+}
+
+static bool core_is_too_hot(const bms_t *bms)
+{
+    const bms_calibration_t *calibration = bms->calibration;
+    const float overshoot_K = calibration->plausibility.temperature_overshoot_K;
+    if (has_family(bms)) {
+        /* A cell that comes hot from a drive waits at 0 A; one that is charged all the same does
+         * not do what it is told. */
+        return is_charging(bms) &&
+               family_is_too_hot(&bms->family, &calibration->family, bms->measurement.current_A,
+                                 overshoot_K);
+    }
+    const rcbf_constants_t *cell = &calibration->rcbf;
+    return bms->estimate.core_temperature_K > cell->max_core_temperature_K.high_K +
+                                                  cell->estimation_error_bound_K + overshoot_K;
+}
+
+/* Whether the decision relies on an estimate that training has not seen. */
+static bool is_out_of_domain(const bms_t *bms)
+{
+    return !bms->estimate.in_domain && !has_family(bms);
+}
+
 static uint32_t symptoms_of_readings(const bms_t *bms)
 {
     const codec_measurement_t *m = &bms->measurement;
@@ -84,13 +162,6 @@ static uint32_t symptoms_of_readings(const bms_t *bms)
     const bool electrical = is_usable(bms, CAN_RECEIVED_CELL_ELECTRICAL);
     const bool thermal = is_usable(bms, CAN_RECEIVED_CELL_THERMAL);
     const bool coolant = is_usable(bms, CAN_RECEIVED_COOLANT);
-    const float model_V = rcbf_open_circuit_voltage_V(cell, bms->soc.soc) -
-                          m->current_A * cell->ohmic_resistance_ohm;
-    const float deviation_A = numeric_abs(m->current_A - bms->command_A);
-    const float deviation_V = numeric_abs(m->voltage_V - model_V);
-    const float core_limit_K =
-        cell->max_core_temperature_K.high_K + cell->estimation_error_bound_K +
-        limits->temperature_overshoot_K;
     const float surface_limit_K =
         cell->max_surface_temperature_K.high_K + limits->temperature_overshoot_K;
 
@@ -108,17 +179,15 @@ static uint32_t symptoms_of_readings(const bms_t *bms)
                       !request_is_valid(m, is_valid(bms, CAN_RECEIVED_CHARGE_MODE),
                                         cell->max_soc),
                   FAULT_REQUEST_INVALID) |
-           bit_if(electrical && thermal && coolant && !bms->estimate.in_domain,
+           bit_if(electrical && thermal && coolant && is_out_of_domain(bms),
                   FAULT_OUT_OF_DOMAIN) |
-           bit_if(electrical && (deviation_A > limits->current_deviation_A),
-                  FAULT_CURRENT_DEVIATION) |
-           bit_if(electrical && bms->soc_known && (deviation_V > limits->voltage_deviation_V),
+           bit_if(electrical && current_deviates(bms), FAULT_CURRENT_DEVIATION) |
+           bit_if(electrical && bms->soc_known && voltage_deviates(bms),
                   FAULT_VOLTAGE_DEVIATION) |
            bit_if(electrical &&
                       (m->voltage_V > cell->max_voltage_V + limits->voltage_overshoot_V),
                   FAULT_OVER_VOLTAGE) |
-           bit_if(thermal && (bms->estimate.core_temperature_K > core_limit_K),
-                  FAULT_CORE_OVER_TEMPERATURE) |
+           bit_if(thermal && core_is_too_hot(bms), FAULT_CORE_OVER_TEMPERATURE) |
            bit_if(thermal && (m->surface_temperature_K > surface_limit_K),
                   FAULT_SURFACE_OVER_TEMPERATURE) |
            bit_if(thermal && (bms->surface_temperature_K - m->surface_temperature_K >
@@ -168,6 +237,10 @@ static void update_estimates(bms_t *bms)
                                                   bms->surface_temperature_K,
                                                   m->coolant_temperature_K };
     bms->estimate = history_estimate(&bms->history, &calibration->kan, measured);
+    if (has_family(bms)) {
+        const family_reading_t reading = reading_of(bms);
+        family_observe(&bms->family, &calibration->family, &calibration->rcbf, &reading);
+    }
     if (bms->soc_known) {
         /* Out of a charge there is no command to count, but perhaps a load. */
         const float commanded_A = is_charging(bms) ? bms->command_A : current_A;
@@ -193,6 +266,10 @@ static void follow_request(bms_t *bms, uint32_t symptoms)
         }
     } else if ((bms->state == BMS_STANDBY) && bms->may_start && (symptoms == 0u)) {
         soc_set(&bms->soc, bms->measurement.plug_in_soc);
+        if (has_family(bms)) {
+            family_begin(&bms->family, &bms->calibration->family, &bms->calibration->rcbf,
+                         bms->measurement.plug_in_soc, bms->measurement.voltage_V);
+        }
         bms->soc_known = true;
         bms->may_start = false;
         bms->state = BMS_CHARGING;
@@ -210,15 +287,32 @@ static float wanted_current_A(const bms_t *bms)
     return (asked_A < allowed_A) ? allowed_A : asked_A;
 }
 
+static bool is_full(const bms_t *bms)
+{
+    const bms_calibration_t *calibration = bms->calibration;
+    return has_family(bms) ? family_is_full(&bms->family, &calibration->family,
+                                            calibration->completion_soc)
+                           : (bms->soc.soc >= calibration->completion_soc);
+}
+
 static void decide(bms_t *bms)
 {
     const codec_measurement_t *m = &bms->measurement;
     const bms_calibration_t *calibration = bms->calibration;
     bms->decision = NO_DECISION;
-    if (is_charging(bms) && (bms->soc.soc >= calibration->completion_soc)) {
+    if (is_charging(bms) && is_full(bms)) {
         bms->state = BMS_COMPLETE;
+        if (has_family(bms)) {
+            /* Voltage and tail current know better than the count. */
+            soc_set(&bms->soc, calibration->rcbf.max_soc);
+        }
     }
-    if (is_charging(bms)) {
+    if (is_charging(bms) && has_family(bms)) {
+        const family_reading_t reading = reading_of(bms);
+        bms->decision = family_decide(&bms->family, &calibration->family, &calibration->rcbf,
+                                      &reading, wanted_current_A(bms));
+        bms->state = (bms->decision.active == RCBF_NONE) ? BMS_CHARGING : BMS_DERATED;
+    } else if (is_charging(bms)) {
         const rcbf_input_t input = {
             .soc = bms->soc.soc,
             .core_temperature_K = { .high_K = bms->estimate.core_temperature_K },

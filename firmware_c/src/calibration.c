@@ -24,7 +24,8 @@ static bool plausibility_is_valid(const plausibility_t *limits)
            range_is_valid(&limits->cooling_power_W) && is_positive(limits->current_deviation_A) &&
            is_positive(limits->voltage_deviation_V) && is_positive(limits->voltage_overshoot_V) &&
            is_positive(limits->temperature_overshoot_K) &&
-           is_positive(limits->surface_deficit_K);
+           is_positive(limits->surface_deficit_K) &&
+           numeric_all_finite(limits->reading_error, KAN_MEASURED_INPUTS);
 }
 
 /* Ports step by a clock of whole milliseconds. */
@@ -43,6 +44,7 @@ bool calibration_is_valid(const bms_calibration_t *calibration)
            rcbf_constants_are_valid(&calibration->rcbf) &&
            plausibility_is_valid(&calibration->plausibility) &&
            thermal_constants_are_valid(&calibration->thermal) &&
+           family_constants_are_valid(&calibration->family) &&
            (calibration->kan.width[0] == KAN_MEASURED_INPUTS + calibration->kan.lags) &&
            kan_model_is_valid(&calibration->kan);
 }

@@ -1,10 +1,10 @@
 #include "soc.h"
 
-static void count(soc_counter_t *counter, float current_A, float period_s, float capacity_As)
+void soc_add(soc_counter_t *counter, float change)
 {
-    const float change = -current_A * period_s / capacity_As - counter->lost;
-    const float sum = counter->soc + change;
-    counter->lost = (sum - counter->soc) - change;
+    const float whole = change - counter->lost;
+    const float sum = counter->soc + whole;
+    counter->lost = (sum - counter->soc) - whole;
     counter->soc = sum;
 }
 
@@ -16,8 +16,8 @@ void soc_set(soc_t *state, float soc)
 void soc_count(soc_t *state, float measured_A, float commanded_A, float period_s,
                float capacity_As)
 {
-    count(&state->measured, measured_A, period_s, capacity_As);
-    count(&state->commanded, commanded_A, period_s, capacity_As);
+    soc_add(&state->measured, -measured_A * period_s / capacity_As);
+    soc_add(&state->commanded, -commanded_A * period_s / capacity_As);
     state->soc = (state->measured.soc < state->commanded.soc) ? state->commanded.soc
                                                                : state->measured.soc;
 }

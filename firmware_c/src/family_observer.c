@@ -1,0 +1,324 @@
+#include "family.h"
+
+#include <math.h>
+
+#include "family_tables.h"
+#include "numeric.h"
+
+/* Periods without usable readings that are bridged. */
+#define MAX_BRIDGED 3u
+
+static float larger(float a, float b)
+{
+    return (a > b) ? a : b;
+}
+
+static float smaller(float a, float b)
+{
+    return (a < b) ? a : b;
+}
+
+static void forget_core(family_t *family)
+{
+    family->core_is_known = false;
+    family->core_room_K = 0.0f;
+    family->rest_count = 0u;
+    family->heat_W = 0.0f;
+    family->surface_temperature_K = -FLT_MAX;
+}
+
+/* A load heats and polarises the cell in ways that nobody follows here. */
+static void forget_after_load(family_t *family, const family_constants_t *constants)
+{
+    forget_core(family);
+    family->soc_known = false;
+    family->rest_polarisation_V = constants->rest_polarisation_V;
+    for (uint32_t i = 0u; i < FAMILY_MAX_BRANCHES; i++) {
+        family->weakest_A[i] = 0.0f;
+    }
+}
+
+void family_reset(family_t *family)
+{
+    *family = (family_t){ .soc_known = false };
+    forget_core(family);
+}
+
+/* Greatest or least state of charge whose open-circuit voltage may be this one. */
+static float soc_at(const rcbf_constants_t *cell, float voltage_V)
+{
+    uint32_t low = 0u;
+    uint32_t high = cell->ocv_points - 1u;
+    const float clamped = numeric_clamp(voltage_V, cell->ocv_V[low], cell->ocv_V[high]);
+    while (high - low > 1u) {
+        const uint32_t middle = (low + high) / 2u;
+        if (clamped > cell->ocv_V[middle]) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    const float share = (clamped - cell->ocv_V[low]) / (cell->ocv_V[high] - cell->ocv_V[low]);
+    return cell->ocv_soc[low] + share * (cell->ocv_soc[high] - cell->ocv_soc[low]);
+}
+
+void family_begin(family_t *family, const family_constants_t *constants,
+                  const rcbf_constants_t *cell, float plug_in_soc, float voltage_V)
+{
+    const float error_V = constants->voltage_error_V + constants->ocv_error_V +
+                          constants->rest_polarisation_V +
+                          constants->current_error_A * constants->resistance_ohm[0];
+    const float told_low = numeric_clamp(plug_in_soc - constants->plug_in_error, 0.0f, 1.0f);
+    const float told_high = numeric_clamp(plug_in_soc + constants->plug_in_error, 0.0f, 1.0f);
+    const float seen_low = soc_at(cell, voltage_V - error_V);
+    const float seen_high = soc_at(cell, voltage_V + error_V);
+    float low = larger(told_low, seen_low);
+    float high = smaller(told_high, seen_high);
+    if (low > high) {
+        /* One of both is wrong; nobody knows which. */
+        low = smaller(told_low, seen_low);
+        high = larger(told_high, seen_high);
+    }
+    family->soc_low = (soc_counter_t){ low, 0.0f };
+    family->soc_high = (soc_counter_t){ high, 0.0f };
+    family->soc_known = true;
+    family->rest_polarisation_V = constants->rest_polarisation_V;
+    family->full_count = 0u;
+}
+
+static void follow_supply(family_t *family, const family_constants_t *constants, float command_A)
+{
+    const float last_A = family->commands_A[0];
+    const float earlier_A = family->commands_A[1];
+    const float low_A = smaller(command_A, smaller(last_A, earlier_A));
+    const float high_A = larger(command_A, larger(last_A, earlier_A));
+    const float rise_A = low_A - family->supply_low_A;
+    const float fall_A = high_A - family->supply_high_A;
+    family->supply_low_A += (rise_A > 0.0f) ? (constants->supply_share * rise_A) : rise_A;
+    family->supply_high_A += (fall_A < 0.0f) ? (constants->supply_share * fall_A) : fall_A;
+    family->commands_A[1] = last_A;
+    family->commands_A[0] = command_A;
+}
+
+static void follow_charge(family_t *family, const family_constants_t *constants, float strength_A)
+{
+    const float least_A = larger(strength_A - constants->current_error_A, 0.0f);
+    const float most_A = strength_A + constants->current_error_A;
+    soc_add(&family->soc_low, least_A * constants->least_soc_per_A);
+    soc_add(&family->soc_high, most_A * constants->greatest_soc_per_A);
+    family->strongest_A = larger(most_A, constants->relaxation * family->strongest_A);
+    for (uint32_t i = 0u; i < constants->branches; i++) {
+        const float way_A = least_A - family->weakest_A[i];
+        const family_branch_t *branch = &constants->branch[i];
+        family->weakest_A[i] += ((way_A > 0.0f) ? branch->rise : branch->fall) * way_A;
+    }
+    family->rest_polarisation_V *= constants->relaxation;
+}
+
+static void look_up(family_t *family, const family_constants_t *constants,
+                    const rcbf_constants_t *cell, const family_reading_t *reading)
+{
+    const float low = family->soc_known ? family->soc_low.soc : 0.0f;
+    const float high =
+        family->soc_known
+            ? (family->soc_high.soc + constants->hold_soc_per_A * family->strongest_A)
+            : 1.0f;
+    const float entropic_V_per_K = family_greatest(constants->entropic_V_per_K, low, high);
+    family->ocv_slope_V = family_greatest(constants->ocv_slope_V, low, high);
+    family->entropic_V =
+        entropic_V_per_K * ((entropic_V_per_K > 0.0f) ? cell->max_core_temperature_K.high_K
+                                                      : constants->coldest_core_K);
+    family->overpotential_V =
+        larger(0.0f, reading->voltage_V - rcbf_open_circuit_voltage_V(cell, low) +
+                         constants->ocv_error_V + constants->voltage_error_V +
+                         2.0f * family->rest_polarisation_V);
+}
+
+family_heat_t family_heat(const family_t *family, const family_constants_t *constants,
+                          const family_reading_t *reading)
+{
+    const float strength_A = larger(-reading->current_A, 0.0f);
+    return (family_heat_t){
+        .overpotential_V = family->overpotential_V,
+        .at_least_A = larger(strength_A - constants->current_error_A, 0.0f),
+        .at_most_A = strength_A + constants->current_error_A,
+        .past_A = family->strongest_A,
+        .resistance_ohm = family_resistance_ohm(
+            constants, reading->surface_temperature_K - constants->surface_error_K),
+        .least_resistance_ohm = constants->least_resistance_ohm,
+        .polarisation_ohm = constants->polarisation_ohm,
+    };
+}
+
+static float heat_now_W(const family_t *family, const family_constants_t *constants,
+                        const family_reading_t *reading)
+{
+    const family_heat_t heat = family_heat(family, constants, reading);
+    const float measured_W = family_measured_heat_W(&heat, heat.at_most_A);
+    const float assumed_W = family_assumed_heat_W(&heat, heat.at_most_A);
+    return smaller(measured_W, assumed_W) + family->entropic_V * heat.at_most_A;
+}
+
+/* The core obeys C T' = heat - (T - Ts) / R + C nu, and the right-hand side is largest for the
+ * greatest R where T is above Ts; so what rises as with the least C and falls as with the greatest
+ * C stays above every core of the family. A fall is taken at its end, where it is slowest. */
+static void follow_core(family_t *family, const family_constants_t *constants,
+                        const rcbf_constants_t *cell, const family_reading_t *reading)
+{
+    const float heat_W = heat_now_W(family, constants, reading);
+    const float strength_A = larger(-reading->current_A, 0.0f) + constants->current_error_A;
+    const float surface_K =
+        larger(reading->surface_temperature_K, family->surface_temperature_K);
+    const float surface_room_K = (cell->max_core_temperature_K.high_K - surface_K) +
+                                 cell->max_core_temperature_K.low_K - constants->surface_error_K;
+    const float disturbance_W =
+        constants->disturbance_W +
+        strength_A * (constants->disturbance_W_per_A +
+                      strength_A * constants->disturbance_W_per_A2);
+    const float net_W = larger(heat_W, family->heat_W) + disturbance_W -
+                        constants->outflow_W_per_K * (surface_room_K - family->core_room_K);
+    family->core_room_K -=
+        ((net_W > 0.0f) ? constants->heating_K_per_W : constants->cooling_K_per_W) * net_W;
+    family->heat_W = heat_W;
+    family->surface_temperature_K = reading->surface_temperature_K;
+    family->core_is_known = family->core_is_known && numeric_is_finite(family->core_room_K);
+}
+
+/* Without current the surface's own balance tells the mean of the core over a time:
+ *   Tc - Ts = Rc Cs (Ts' - nu) + (Rc / Rs) (Ts - Tinf)
+ * and a core without current is no hotter than its mean, unless the surface is hotter still. */
+static void look_at_rest(family_t *family, const family_constants_t *constants,
+                         const rcbf_constants_t *cell, const family_reading_t *reading)
+{
+    const float surface_K = reading->surface_temperature_K;
+    if (family->rest_count == 0u) {
+        family->rest_surface_K = surface_K;
+        family->rest_rise_K = 0.0f;
+        family->rest_gap_K = 0.0f;
+    }
+    family->rest_rise_K += surface_K - family->rest_surface_K;
+    family->rest_gap_K += surface_K - reading->coolant_temperature_K;
+    family->rest_count++;
+    if (family->rest_count < constants->rest_periods) {
+        return;
+    }
+    const float share = 1.0f / (float)family->rest_count;
+    const float rise_K = surface_K - family->rest_surface_K;
+    const float mean_K = family->rest_surface_K + share * family->rest_rise_K;
+    const float above_K =
+        larger(0.0f, larger(0.0f, rise_K) * constants->per_surface_rise +
+                         larger(0.0f, share * family->rest_gap_K) * constants->per_coolant_gap);
+    const float hottest_K = larger(surface_K, mean_K + above_K) + constants->rest_error_K;
+    const float room_K = (cell->max_core_temperature_K.high_K - hottest_K) +
+                         cell->max_core_temperature_K.low_K;
+    if (!family->core_is_known || (room_K > family->core_room_K)) {
+        family->core_room_K = room_K;
+        family->core_is_known = numeric_is_finite(room_K);
+    }
+    family->rest_count = 0u;
+}
+
+static bool is_at_rest(const family_constants_t *constants, const family_reading_t *reading)
+{
+    return numeric_abs(reading->current_A) <= 2.0f * constants->current_error_A;
+}
+
+/* What resistance and polarisation cannot explain of the voltage is open-circuit voltage. */
+static void look_for_full(family_t *family, const family_constants_t *constants,
+                          const family_reading_t *reading)
+{
+    const family_heat_t heat = family_heat(family, constants, reading);
+    const float least_ocv_V =
+        reading->voltage_V - constants->voltage_error_V - constants->ocv_error_V -
+        family->rest_polarisation_V - heat.resistance_ohm * heat.at_most_A -
+        heat.polarisation_ohm * heat.past_A;
+    const bool is_full = reading->is_charging && (least_ocv_V >= constants->full_ocv_V);
+    family->full_count = is_full ? (family->full_count + 1u) : 0u;
+}
+
+/* Without readings the core takes up all the heat that the strongest possible current can make; for
+ * a few periods only, since the reaction to missing readings is 0 A and nothing is known for long. */
+static void bridge(family_t *family, const family_constants_t *constants)
+{
+    family->bridged++;
+    family->rest_count = 0u;
+    if (family->bridged > MAX_BRIDGED) {
+        forget_after_load(family, constants);
+        return;
+    }
+    const float strength_A = family->supply_high_A * (1.0f + constants->supply_tolerance);
+    const family_heat_t heat = {
+        .past_A = larger(strength_A, family->strongest_A),
+        .resistance_ohm = constants->resistance_ohm[0],
+        .polarisation_ohm = constants->polarisation_ohm,
+    };
+    soc_add(&family->soc_high, strength_A * constants->greatest_soc_per_A);
+    family->strongest_A = heat.past_A;
+    family->core_room_K -=
+        constants->heating_K_per_W *
+        (family_assumed_heat_W(&heat, strength_A) + larger(0.0f, family->entropic_V) * strength_A +
+         constants->disturbance_W +
+         strength_A * (constants->disturbance_W_per_A +
+                       strength_A * constants->disturbance_W_per_A2));
+}
+
+void family_observe(family_t *family, const family_constants_t *constants,
+                    const rcbf_constants_t *cell, const family_reading_t *reading)
+{
+    follow_supply(family, constants, larger(-reading->command_A, 0.0f));
+    if (!reading->is_usable) {
+        bridge(family, constants);
+        return;
+    }
+    family->bridged = 0u;
+    const float strength_A = larger(-reading->current_A, 0.0f);
+    follow_charge(family, constants, strength_A);
+    look_up(family, constants, cell, reading);
+    look_for_full(family, constants, reading);
+    if (is_at_rest(constants, reading)) {
+        follow_core(family, constants, cell, reading);
+        look_at_rest(family, constants, cell, reading);
+    } else if (reading->is_charging) {
+        follow_core(family, constants, cell, reading);
+        family->rest_count = 0u;
+    } else {
+        forget_after_load(family, constants);
+    }
+}
+
+bool family_is_full(const family_t *family, const family_constants_t *constants,
+                    float completion_soc)
+{
+    return (family->soc_known && (family->soc_low.soc >= completion_soc)) ||
+           (family->full_count >= constants->full_periods);
+}
+
+bool family_is_too_hot(const family_t *family, const family_constants_t *constants,
+                       float current_A, float overshoot_K)
+{
+    return family->core_is_known && (family->core_room_K < -overshoot_K) &&
+           (-current_A > 2.0f * constants->current_error_A);
+}
+
+bool family_supply_is_plausible(const family_t *family, const family_constants_t *constants,
+                                float current_A, float deviation_A)
+{
+    const float strength_A = -current_A;
+    const float low_A = family->supply_low_A * (1.0f - constants->supply_tolerance);
+    const float high_A = family->supply_high_A * (1.0f + constants->supply_tolerance);
+    return (strength_A >= low_A - deviation_A) && (strength_A <= high_A + deviation_A);
+}
+
+bool family_voltage_is_plausible(const family_t *family, const family_constants_t *constants,
+                                 const rcbf_constants_t *cell, const family_reading_t *reading,
+                                 float deviation_V)
+{
+    const family_heat_t heat = family_heat(family, constants, reading);
+    const float spread_V = constants->ocv_error_V + family->rest_polarisation_V + deviation_V;
+    const float low_V = rcbf_open_circuit_voltage_V(cell, family->soc_low.soc) +
+                        heat.least_resistance_ohm * heat.at_least_A - spread_V;
+    const float high_V = rcbf_open_circuit_voltage_V(cell, family->soc_high.soc) +
+                         heat.resistance_ohm * heat.at_most_A +
+                         heat.polarisation_ohm * heat.past_A + spread_V;
+    return (reading->voltage_V >= low_V) && (reading->voltage_V <= high_V);
+}

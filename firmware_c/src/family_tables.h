@@ -1,0 +1,42 @@
+/* What the tables of a family say; shared by observer and decision. */
+#ifndef FAMILY_TABLES_H
+#define FAMILY_TABLES_H
+
+#include "family.h"
+
+/* Greatest ohmic resistance of a cell whose coldest part has this temperature. */
+float family_resistance_ohm(const family_constants_t *constants, float temperature_K);
+
+/* Greatest value of any cell of the grid between two states of charge. */
+float family_greatest(const float *cells, float soc_low, float soc_high);
+
+/* Strongest current that the map allows. */
+float family_mapped_A(const family_map_t *map, float temperature_K, float soc);
+
+/* Upper bound on the heat of a strength whose polarisation no stronger one than `past_A` left, for
+ * a measured overpotential at another strength. */
+typedef struct {
+    float overpotential_V;
+    float at_least_A; /* the measured strength, within its error */
+    float at_most_A;
+    float past_A;
+    float resistance_ohm;
+    float least_resistance_ohm;
+    float polarisation_ohm;
+} family_heat_t;
+
+/* That of the cell at hand, from readings and what is known. */
+family_heat_t family_heat(const family_t *family, const family_constants_t *constants,
+                          const family_reading_t *reading);
+
+float family_measured_heat_W(const family_heat_t *heat, float strength_A);
+float family_assumed_heat_W(const family_heat_t *heat, float strength_A);
+
+/* Largest strength at which each of these bounds is no more than limit_W - slope a - square a^2;
+ * negative where there is none. */
+float family_measured_strength_A(const family_heat_t *heat, float square, float slope,
+                                 float limit_W);
+float family_assumed_strength_A(const family_heat_t *heat, float square, float slope,
+                                float limit_W);
+
+#endif
