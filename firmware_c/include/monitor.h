@@ -1,7 +1,8 @@
 /* Faults: which symptoms there are, how long each may last, and which stay until reset.
  *
  * A symptom that stops at once gives 0 A in the very period in which it is seen. A symptom that
- * lasts for its debounce time becomes a latched fault.
+ * lasts for its debounce time becomes a latched fault, and so does one that the stop removes as often
+ * as it comes back.
  */
 #ifndef MONITOR_H
 #define MONITOR_H
@@ -40,7 +41,8 @@ typedef enum {
 #define FAULT_NONE 255
 
 typedef struct {
-    uint8_t lasted[FAULT_COUNT]; /* periods without a break, saturating */
+    uint8_t lasted[FAULT_COUNT];    /* periods without a break, saturating */
+    uint16_t returned[FAULT_COUNT]; /* MONITOR_RETURN_PERIODS a time, less those since */
     uint32_t active;             /* bit n: symptom n seen in this period */
     uint32_t latched;            /* bit n: fault n stands until monitor_reset */
     uint8_t first;               /* fault that latched first, or FAULT_NONE */
@@ -50,7 +52,11 @@ typedef struct {
 typedef struct {
     uint8_t debounce_periods; /* symptom in this many periods in a row latches the fault */
     bool stops_at_once;
+    uint8_t returns; /* times within MONITOR_RETURN_PERIODS, or as often over longer, that latch the
+                        fault as well; 0 for a symptom that may come and go */
 } fault_policy_t;
+
+#define MONITOR_RETURN_PERIODS 600
 
 extern const fault_policy_t MONITOR_POLICY[FAULT_COUNT];
 

@@ -213,6 +213,18 @@ static void update_surface_temperature(bms_t *bms, float current_A, bool is_surf
     }
 }
 
+/* A reading just outside of the box, by no more than its error, is taken for one on its face. */
+static float within_box(const kan_model_t *model, uint32_t input, float value, float error)
+{
+    const float reach = 1.0f / model->input_scale[input];
+    const float low = model->input_center[input] - reach;
+    const float high = model->input_center[input] + reach;
+    if ((value < low) && (value >= low - error)) {
+        return low;
+    }
+    return ((value > high) && (value <= high + error)) ? high : value;
+}
+
 static void update_estimates(bms_t *bms)
 {
     const codec_measurement_t *m = &bms->measurement;
@@ -233,9 +245,13 @@ static void update_estimates(bms_t *bms)
     update_surface_temperature(bms, current_A, is_surface_usable && is_coolant_usable);
     history_step(&bms->history, &calibration->kan, current_A, bms->surface_temperature_K,
                  is_surface_usable);
-    const float measured[KAN_MEASURED_INPUTS] = { m->current_A, m->cooling_power_W,
-                                                  bms->surface_temperature_K,
-                                                  m->coolant_temperature_K };
+    float measured[KAN_MEASURED_INPUTS] = { m->current_A, m->cooling_power_W,
+                                            bms->surface_temperature_K,
+                                            m->coolant_temperature_K };
+    for (uint32_t i = 0u; i < KAN_MEASURED_INPUTS; i++) {
+        measured[i] =
+            within_box(&calibration->kan, i, measured[i], limits->reading_error[i]);
+    }
     bms->estimate = history_estimate(&bms->history, &calibration->kan, measured);
     if (has_family(bms)) {
         const family_reading_t reading = reading_of(bms);
