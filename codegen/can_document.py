@@ -125,17 +125,18 @@ def _faults(firmware: Path) -> Iterator[dict[str, Any]]:
     header = (firmware / "include" / "monitor.h").read_text(encoding="utf-8")
     policy = (firmware / "src" / "monitor.c").read_text(encoding="utf-8")
     rows = dict(
-        (name, (int(periods), at_once == "true"))
-        for name, periods, at_once in re.findall(
-            r"\[FAULT_(\w+)\] = \{ (\d+)u, (true|false) \}", policy
+        (name, (int(periods), at_once == "true", int(returns)))
+        for name, periods, at_once, returns in re.findall(
+            r"\[FAULT_(\w+)\] = \{ (\d+)u, (true|false), (\d+)u \}", policy
         )
     )
     for name, bit, meaning in re.findall(r"FAULT_(\w+) = (\d+),? /\* (.+?) \*/", header):
-        periods, at_once = rows[name]
+        periods, at_once, returns = rows[name]
         yield {
             "bit": int(bit),
             "name": name.replace("_", " ").capitalize(),
             "meaning": meaning,
             "debounce_periods": periods,
             "stops_at_once": at_once,
+            "returns": returns,
         }

@@ -135,7 +135,7 @@ def by_soc_cell(points: tuple[float, ...], values: Array, per_segment: bool) -> 
 
 
 def ocv_slopes_V(cell: CellParameters) -> Array:
-    """Greatest slope of the open-circuit voltage in each cell of the grid (V per state of charge)."""
+    """Greatest slope of the open-circuit voltage in each cell of the grid, in V."""
     slopes = np.diff(cell.ocv.voltage_V) / np.diff(cell.ocv.soc)
     greatest = by_soc_cell(cell.ocv.soc, slopes, per_segment=True)
     greatest[-1] = max(greatest[-1], cell.ocv.overfill_slope_V)
