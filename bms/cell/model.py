@@ -34,17 +34,21 @@ def rates(
     current_A: Any,
     cooling_power_W: Any,
     disturbance: Disturbance = NO_DISTURBANCE,
+    polarisation_heat_W: Any = 0,
 ) -> CellState:
     """Time derivative of the state (1/s, K/s, K/s, K/s); the current is negative while charging.
 
-    Source: paper, equation of the electro-thermal dynamics, with the coolant's own heat capacity.
+    The heat of the branches (bms.cell.polarisation) warms the core. Source: paper, equation of the
+    electro-thermal dynamics, with the coolant's own heat capacity.
     """
-    _, core, surface, coolant = state
+    soc, core, surface, coolant = state
     core_to_surface_W = (core - surface) / cell.core_resistance_K_per_W
     surface_to_coolant_W = (surface - coolant) / cell.surface_resistance_K_per_W
-    heat_W = (
-        cell.ohmic_resistance_ohm * current_A - cell.entropic_coefficient_V_per_K * core
-    ) * current_A
+    # Symbols may stand for a cell of constants; they know of no table.
+    entropy = getattr(cell, "entropy", None)
+    entropic_V_per_K = cell.entropic_coefficient_V_per_K if entropy is None else entropy(soc)
+    ohm = ohmic_resistance_ohm(cell, core, soc)
+    heat_W = (ohm * current_A - entropic_V_per_K * core) * current_A + polarisation_heat_W
     return CellState(
         disturbance.soc_per_s - current_A / cell.capacity_As,
         disturbance.core_K_per_s + (heat_W - core_to_surface_W) / cell.core_heat_capacity_J_per_K,
@@ -55,6 +59,29 @@ def rates(
     )
 
 
-def terminal_voltage_V(cell: CellParameters, soc: Any, current_A: Any) -> Any:
-    """Terminal voltage in V: open-circuit voltage less the ohmic drop (paper, output equation)."""
-    return cell.ocv(soc) - current_A * cell.ohmic_resistance_ohm
+def ohmic_resistance_ohm(cell: CellParameters, core_temperature_K: Any, soc: Any) -> Any:
+    """Ohmic resistance in ohm at a core temperature and state of charge: table or constant."""
+    table = getattr(cell, "resistance", None)
+    return cell.ohmic_resistance_ohm if table is None else table(core_temperature_K, soc)
+
+
+def terminal_voltage_V(
+    cell: CellParameters,
+    soc: Any,
+    current_A: Any,
+    core_temperature_K: Any = None,
+    polarisation_V: tuple[Any, ...] = (),
+) -> Any:
+    """Terminal voltage in V: open-circuit voltage, ohmic drop, and what the branches add.
+
+    Without a core temperature the resistance is the constant one, as a controller knows it. Source:
+    paper, output equation.
+    """
+    if core_temperature_K is None:
+        ohm = cell.ohmic_resistance_ohm
+    else:
+        ohm = ohmic_resistance_ohm(cell, core_temperature_K, soc)
+    voltage_V = cell.ocv(soc) - current_A * ohm
+    for branch_V in polarisation_V:
+        voltage_V = voltage_V + branch_V
+    return voltage_V

@@ -1,7 +1,8 @@
 """Process disturbances within the bounds of a preset, as knots at the plant's sub-steps.
 
 A source yields the disturbance at the end of each sub-step; between two knots it runs linearly.
-Every source stays within the preset's bounds; the surface disturbance starts from zero and changes
+Every source stays within the preset's bounds, with the core's at the reference current, from which
+the plant scales it to that of the present one. The surface disturbance starts from zero and changes
 by no more than its slope bound allows.
 """
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from bms.cell import Disturbance
 from bms.presets import Preset
+from bms.presets.schema import Uncertainty
 
 Source = Iterator[Disturbance]
 
@@ -43,7 +45,7 @@ def disturbance_source(
     """
     if kind is DisturbanceKind.NONE:
         return itertools.repeat(Disturbance())
-    bounds = _bounds(preset)
+    bounds = knot_bounds(preset)
     wanted: dict[DisturbanceKind, Callable[[], Iterator[list[float]]]] = {
         DisturbanceKind.GAUSSIAN: lambda: _gaussian(bounds, rng),
         DisturbanceKind.BANG_BANG: lambda: _bang_bang(bounds, step_s, rng),
@@ -52,11 +54,23 @@ def disturbance_source(
     return _slope_limited(wanted[kind](), preset.uncertainty.surface_rate_K_per_s2 * step_s)
 
 
-def _bounds(preset: Preset) -> Disturbance:
+def knot_bounds(preset: Preset) -> Disturbance:
+    """Bounds of the knots of every source; that of the core is the one at the reference current."""
     bounds = preset.uncertainty
     return Disturbance(
-        bounds.soc_per_s, bounds.core_K_per_s, bounds.surface_K_per_s, bounds.coolant_K_per_s
+        bounds.soc_per_s,
+        bounds.core_at_K_per_s(preset.limits.reference_current_A),
+        bounds.surface_K_per_s,
+        bounds.coolant_K_per_s,
     )
+
+
+def core_growth(bounds: Uncertainty, current_A: float, reference_current_A: float) -> float:
+    """Factor on a knot's core at a current: its bound there over that at the reference current."""
+    at_reference = bounds.core_at_K_per_s(reference_current_A)
+    if at_reference == bounds.core_K_per_s:
+        return 1.0
+    return float(bounds.core_at_K_per_s(current_A) / at_reference)
 
 
 def _gaussian(bounds: Disturbance, rng: np.random.Generator) -> Iterator[list[float]]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bms.cell import CellState, integrate_step, terminal_voltage_V
+from bms.cell import Disturbance, integrate_step, polarisation_after_V, terminal_voltage_V
 from bms.presets import Preset
 from bms.presets.schema import Limits
-from hil_sim.plant.disturbances import Source
+from hil_sim.plant.disturbances import Source, core_growth
+from hil_sim.plant.true_cell import TrueCell, nominal_cell
 
 SUB_STEPS = 10
 
@@ -48,43 +49,76 @@ class Plant:
     disturbance has a knot at every sub-step.
     """
 
-    def __init__(self, preset: Preset, disturbance: Source) -> None:
-        start = preset.initial
-        self._cell = preset.cell
+    def __init__(
+        self, preset: Preset, disturbance: Source, true_cell: TrueCell | None = None
+    ) -> None:
+        """The preset's own cell at its start, or another one."""
+        true_cell = true_cell or nominal_cell(preset)
+        self._cell = true_cell.cell
+        self._bounds = preset.uncertainty
+        self._reference_A = preset.limits.reference_current_A
         self._step_s = preset.timing.sampling_period_s / SUB_STEPS
         self._source = disturbance
         self._knot = next(disturbance)
-        self.cooling_power_W = start.cooling_power_W
+        self.plug_in_soc = true_cell.plug_in_soc
+        self.cooling_power_W = true_cell.cooling_power_W
         self.current_A = 0.0
-        self.state = CellState(
-            start.soc, start.temperature_K, start.temperature_K, start.temperature_K
-        )
+        self.state = true_cell.state
+        self.polarisation_V = true_cell.polarisation_V
         self.extremes = Extremes(
-            start.temperature_K, start.temperature_K, self.voltage_V, start.soc
+            self.state.core_temperature_K,
+            self.state.surface_temperature_K,
+            self.voltage_V,
+            self.state.soc,
         )
 
     @property
     def voltage_V(self) -> float:
         """Terminal voltage in V at the present state and current."""
-        return float(terminal_voltage_V(self._cell, self.state.soc, self.current_A))
+        return float(
+            terminal_voltage_V(
+                self._cell,
+                self.state.soc,
+                self.current_A,
+                self.state.core_temperature_K,
+                self.polarisation_V,
+            )
+        )
 
     def advance(self) -> None:
         """Hold the present current for one control period."""
-        current_A = self.current_A
-        state, before, extremes = self.state, self._knot, self.extremes
-        highest_soc = state.soc
+        current_A, cell, extremes = self.current_A, self._cell, self.extremes
+        step_s, cooling_W = self._step_s, self.cooling_power_W
+        growth = core_growth(self._bounds, current_A, self._reference_A)
+        is_plain = cell.resistance is None and not cell.branches
+        before = _grown(self._knot, growth)
+        highest_soc = self.state.soc
+        if not is_plain:
+            extremes.voltage_V = max(extremes.voltage_V, self.voltage_V)
         for _ in range(SUB_STEPS):
-            after = next(self._source)
-            state = integrate_step(
-                self._cell, state, current_A, self.cooling_power_W, self._step_s, before, after
+            self._knot = next(self._source)
+            after = _grown(self._knot, growth)
+            volts = self.polarisation_V
+            self.state = integrate_step(
+                cell, self.state, current_A, cooling_W, step_s, before, after, volts
             )
             before = after
-            soc, core_K, surface_K, _ = state
+            soc, core_K, surface_K, _ = self.state
             highest_soc = max(highest_soc, soc)
             extremes.core_temperature_K = max(extremes.core_temperature_K, core_K)
             extremes.surface_temperature_K = max(extremes.surface_temperature_K, surface_K)
-        self.state, self._knot = state, before
+            if not is_plain:
+                self.polarisation_V = polarisation_after_V(cell, volts, current_A, step_s)
+                extremes.voltage_V = max(extremes.voltage_V, self.voltage_V)
         extremes.soc = max(extremes.soc, highest_soc)
-        # At one current the voltage rises with the state of charge, so its peak is there.
-        peak_V = float(terminal_voltage_V(self._cell, highest_soc, current_A))
-        extremes.voltage_V = max(extremes.voltage_V, peak_V)
+        if is_plain:
+            # At one current the voltage rises with the state of charge, so its peak is there.
+            peak_V = float(terminal_voltage_V(cell, highest_soc, current_A))
+            extremes.voltage_V = max(extremes.voltage_V, peak_V)
+
+
+def _grown(knot: Disturbance, growth: float) -> Disturbance:
+    """A knot of a source, whose core is that of the reference current, at another current."""
+    if growth == 1.0:
+        return knot
+    return knot._replace(core_K_per_s=knot.core_K_per_s * growth)

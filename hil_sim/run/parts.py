@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,9 +14,11 @@ from hil_sim.faults import Injection
 from hil_sim.nodes.ecu import EcuLike
 from hil_sim.nodes.python_ecu import PythonEcu
 from hil_sim.nodes.views import BusMeasurements, TrueState
+from hil_sim.plant.charger import Charger
 from hil_sim.plant.disturbances import disturbance_source
 from hil_sim.plant.plant import SUB_STEPS, Plant
 from hil_sim.plant.sensors import SensorSuite
+from hil_sim.plant.true_cell import nominal_cell
 from hil_sim.run.settings import ControllerKind, Settings
 
 EcuFactory = Callable[[Plant, "dict[str, MessageCodec]"], EcuLike]
@@ -38,17 +39,32 @@ def injection_of(settings: Settings, database: dict[str, MessageCodec]) -> Injec
 
 
 def plant_of(settings: Settings) -> Plant:
-    """The cell at its start, with its disturbance."""
+    """The cell at its start, with its disturbance: that of the preset or another one."""
     preset = settings.preset
     step_s = preset.timing.sampling_period_s / SUB_STEPS
     rng = np.random.default_rng(_seeds(settings.seed)[0])
     disturbance = disturbance_source(settings.disturbance, preset, step_s, rng)
-    return Plant(replace(preset, initial=settings.initial or preset.initial), disturbance)
+    true_cell = settings.true_cell or nominal_cell(preset, settings.initial)
+    return Plant(preset, disturbance, true_cell)
 
 
 def sensors_of(settings: Settings) -> SensorSuite:
-    """The sensors, with their noise."""
-    return SensorSuite(settings.preset.sensors, np.random.default_rng(_seeds(settings.seed)[1]))
+    """The sensors, with their noise and the biases that are true of them."""
+    sensors, true_cell = settings.preset.sensors, settings.true_cell
+    if true_cell is not None:
+        sensors = true_cell.sensors(sensors)
+    return SensorSuite(sensors, np.random.default_rng(_seeds(settings.seed)[1]))
+
+
+def charger_of(settings: Settings) -> Charger:
+    """The charger: ideal, but for what is true of it. Raises InputError as Charger does."""
+    supply = settings.true_cell or nominal_cell(settings.preset)
+    return Charger(
+        settings.preset,
+        settings.charger_delay_periods,
+        supply.supply_tolerance,
+        supply.supply_lag_s,
+    )
 
 
 def ecu_factory_of(settings: Settings) -> EcuFactory:

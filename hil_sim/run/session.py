@@ -19,10 +19,16 @@ from hil_sim.nodes.ecu import EcuNode
 from hil_sim.nodes.line_losses import LossWatch
 from hil_sim.nodes.plant import PlantNode
 from hil_sim.nodes.turns import LockStep, OnClock, PacedLockStep, Turn
-from hil_sim.plant.charger import Charger
 from hil_sim.plant.plant import Plant
 from hil_sim.run.charge import Charge, Progress
-from hil_sim.run.parts import EcuFactory, ecu_factory_of, injection_of, plant_of, sensors_of
+from hil_sim.run.parts import (
+    EcuFactory,
+    charger_of,
+    ecu_factory_of,
+    injection_of,
+    plant_of,
+    sensors_of,
+)
 from hil_sim.run.result import RunResult
 from hil_sim.run.settings import ControllerKind, Settings
 from hil_sim.run.summary import sum_up
@@ -166,7 +172,7 @@ def _run(
         ),
         plant=plant,
         sensors=sensors_of(settings),
-        charger=Charger(preset, settings.charger_delay_periods),
+        charger=charger_of(settings),
         injection=injection,
         max_time_s=settings.max_time_s,
         ends_early=settings.ends_early,

@@ -11,6 +11,7 @@ from bms.presets import Preset
 from bms.presets.schema import Initial
 from hil_sim.faults import Fault
 from hil_sim.plant.disturbances import DisturbanceKind
+from hil_sim.plant.true_cell import TrueCell
 
 ANSWER_TIMEOUT_S = 1.0
 
@@ -46,3 +47,6 @@ class Settings:
     ends_early: bool = True
     initial: Initial | None = None
     """State of the cell at the start; that of the preset without."""
+    true_cell: TrueCell | None = None
+    """The cell as it truly is, with its charger and sensors, in place of the preset's at `initial`.
+    """

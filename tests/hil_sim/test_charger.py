@@ -1,5 +1,6 @@
 """The charger supplies what is commanded and stops when commands stop."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -12,6 +13,11 @@ from hil_sim.plant.charger import Charger
 
 PRESET = load_preset("paper_calibrated")
 REFERENCE_A = PRESET.limits.reference_current_A
+
+
+def play_lagging(commands, tolerance=0.0, lag_s=0.0):
+    charger = Charger(PRESET, tolerance=tolerance, lag_s=lag_s)
+    return [charger.current_A(command) for command in commands]
 
 
 def play(commands, delay_periods=0, preset=PRESET):
@@ -70,3 +76,26 @@ def test_a_delay_beyond_what_the_preset_covers_is_refused(delay):
 def test_a_preset_without_delay_stops_at_the_first_missing_command():
     strict = replace(PRESET, timing=replace(PRESET.timing, delay_s=0.0))
     assert play([-5.0, None], preset=strict) == [-5.0, 0.0]
+
+
+@pytest.mark.parametrize("tolerance", [-0.05, 0.05])
+def test_a_charger_with_a_tolerance_supplies_that_much_more_or_less(tolerance):
+    assert play_lagging([-10.0, -20.0], tolerance) == [
+        -10.0 * (1 + tolerance),
+        -20.0 * (1 + tolerance),
+    ]
+
+
+def test_a_lagging_charger_follows_as_a_low_pass_of_first_order():
+    """After a step the current is that of 1 - exp(-t/lag) at the end of each period."""
+    period_s, lag_s = PRESET.timing.sampling_period_s, 1.0
+    currents_A = play_lagging([-20.0] * 50, lag_s=lag_s)
+    expected_A = [-20.0 * (1.0 - math.exp(-(k + 1) * period_s / lag_s)) for k in range(50)]
+    assert currents_A == pytest.approx(expected_A, rel=1e-12)
+
+
+def test_a_lagging_charger_without_commands_dies_away():
+    currents_A = play_lagging([-20.0] * 100 + [None] * 100, lag_s=0.5)
+    assert currents_A[99] == pytest.approx(-20.0)
+    assert currents_A[101] == pytest.approx(-20.0 * math.exp(-0.2), rel=1e-6)
+    assert abs(currents_A[-1]) < 1e-6

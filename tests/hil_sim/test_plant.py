@@ -8,9 +8,20 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from bms.cell import Disturbance
-from bms.presets import Preset
+from bms.cell import (
+    Branch,
+    CellState,
+    Disturbance,
+    EntropyTable,
+    ResistanceTable,
+    integrate_step,
+    polarisation_after_V,
+    terminal_voltage_V,
+)
+from bms.presets import Preset, load_preset
+from hil_sim.plant.disturbances import DisturbanceKind, disturbance_source
 from hil_sim.plant.plant import SUB_STEPS, Extremes, Plant
+from hil_sim.plant.true_cell import nominal_cell
 
 CALM = Disturbance()
 
@@ -126,3 +137,110 @@ def test_limit_is_kept_exactly_on_it_and_violated_one_step_above(preset, field, 
     above = math.nextafter(getattr(preset.limits, limit), math.inf)
     assert len(replace(on_limits, **{field: above}).violations(preset.limits)) == 1
     assert len(replace(on_limits, **{field: math.nan}).violations(preset.limits)) == 1
+
+
+REAL = replace(
+    load_preset("lin2014").cell,
+    resistance=ResistanceTable(
+        (280.0, 300.0, 320.0), (0.0, 1.0), ((0.03, 0.02), (0.012, 0.011), (0.01, 0.01))
+    ),
+    entropy=EntropyTable((0.0, 0.5, 1.0), (-4e-4, 5e-5, 2e-4)),
+    branches=(Branch(0.0025, 10.0), Branch(0.0035, 100.0)),
+)
+
+
+def plugged_in(preset, **changes):
+    return replace(nominal_cell(replace(preset, cell=REAL)), **changes)
+
+
+def test_a_real_cell_follows_a_tight_integrator_from_a_start_that_is_not_at_rest(preset):
+    """Tables, branches, and core, surface and coolant each at a temperature of its own."""
+    start = CellState(0.2, 306.0, 299.0, 290.0)
+    plant = Plant(
+        preset,
+        itertools.repeat(CALM),
+        plugged_in(preset, state=start, polarisation_V=(0.02, -0.01)),
+    )
+    expected = np.array([*start, 0.02, -0.01])
+    for current_A in (-23.0, 0.0, -12.0):
+
+        def right_side(t, x, u=current_A):
+            s, tc, *_ = x
+            column = [np.interp(s, REAL.resistance.soc, row) for row in REAL.resistance.ohm]
+            cell = replace(
+                REAL,
+                ohmic_resistance_ohm=float(np.interp(tc, REAL.resistance.temperature_K, column)),
+                entropic_coefficient_V_per_K=float(
+                    np.interp(s, REAL.entropy.soc, REAL.entropy.V_per_K)
+                ),
+            )
+            heat_W = sum(v * v / b.resistance_ohm for v, b in zip(x[4:], REAL.branches))
+            calm = right_hand_side(
+                replace(preset, cell=cell),
+                u,
+                plant.cooling_power_W,
+                lambda t: (0.0, heat_W / REAL.core_heat_capacity_J_per_K, 0.0, 0.0),
+            )
+            return [
+                *calm(t, x[:4]),
+                *(
+                    -(v + u * b.resistance_ohm) / b.time_constant_s
+                    for v, b in zip(x[4:], REAL.branches)
+                ),
+            ]
+
+        plant.current_A = current_A
+        for _ in range(200):
+            plant.advance()
+        for _ in range(10):
+            expected = solve_ivp(
+                right_side, (0.0, 2.0), expected, method="DOP853", rtol=1e-10, atol=1e-11
+            ).y[:, -1]
+    assert np.abs(np.array([*plant.state, *plant.polarisation_V]) - expected).max() < 1e-6
+
+
+def test_the_voltage_peak_of_a_polarised_cell_at_rest_is_its_first_instant(preset):
+    plant = Plant(preset, itertools.repeat(CALM), plugged_in(preset, polarisation_V=(0.05, 0.0)))
+    begin_V = plant.voltage_V
+    assert begin_V == pytest.approx(float(REAL.ocv(preset.initial.soc)) + 0.05)
+    for _ in range(10):
+        plant.advance()
+    assert plant.voltage_V < begin_V - 0.004
+    assert plant.extremes.voltage_V == begin_V
+
+
+def test_the_voltage_peak_of_a_cell_with_branches_is_that_of_the_finest_look(preset):
+    """Currents that jump between periods: the peak is held against a look every millisecond."""
+    random = np.random.default_rng(7)
+    plant = Plant(preset, itertools.repeat(CALM), plugged_in(preset))
+    state, volts, highest_V = plant.state, plant.polarisation_V, plant.voltage_V
+    for current_A in random.uniform(-23.0, 0.0, 50):
+        plant.current_A = float(current_A)
+        plant.advance()
+        for step in range(101):
+            voltage_V = terminal_voltage_V(
+                REAL, state.soc, current_A, state.core_temperature_K, volts
+            )
+            highest_V = max(highest_V, float(voltage_V))
+            if step == 100:
+                break
+            state = integrate_step(
+                REAL, state, current_A, plant.cooling_power_W, 1e-3, polarisation_V=volts
+            )
+            volts = polarisation_after_V(REAL, volts, current_A, 1e-3)
+    assert plant.extremes.voltage_V == pytest.approx(highest_V, abs=1e-5)
+
+
+def test_a_disturbance_that_grows_with_the_current_is_the_bound_at_that_current(preset):
+    bounds = replace(preset.uncertainty, core_K_per_s=1e-3, core_K_per_As=2e-4, core_K_per_A2s=3e-5)
+    grown = replace(preset, uncertainty=bounds)
+    source = disturbance_source(DisturbanceKind.UPWARD, grown, 0.01, None)
+    plant, calm = Plant(grown, source), Plant(grown, itertools.repeat(CALM))
+    for current_A in (0.0, -5.0, -23.0):
+        core_K = plant.state.core_temperature_K - calm.state.core_temperature_K
+        plant.current_A = calm.current_A = current_A
+        plant.advance()
+        calm.advance()
+        rise_K = plant.state.core_temperature_K - calm.state.core_temperature_K - core_K
+        allowed_K_per_s = 1e-3 + 2e-4 * abs(current_A) + 3e-5 * current_A**2
+        assert rise_K == pytest.approx(0.1 * allowed_K_per_s, rel=0.01)
