@@ -20,6 +20,8 @@ class Extremes:
     surface_temperature_K: float
     voltage_V: float
     soc: float
+    min_anode_potential_V: float | None = None
+    """Least, where the plant has electrodes: lithium plates below 0."""
 
     def violations(self, limits: Limits) -> list[str]:
         """Each limit that was exceeded, by however little, as text with both figures."""

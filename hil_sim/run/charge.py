@@ -13,7 +13,7 @@ from hil_sim.bus.refusal import refusal_text
 from hil_sim.faults import Injection
 from hil_sim.nodes.plant import Answer, PlantNode, Request
 from hil_sim.plant.charger import Charger
-from hil_sim.plant.plant import Plant
+from hil_sim.plant.seam import PlantLike
 from hil_sim.plant.sensors import Readings, SensorSuite
 from hil_sim.run.result import (
     STOP_COMPLETE,
@@ -44,7 +44,7 @@ class Charge:
 
     preset: Preset
     node: PlantNode
-    plant: Plant
+    plant: PlantLike
     sensors: SensorSuite
     charger: Charger
     injection: Injection

@@ -20,7 +20,7 @@ from hil_sim.nodes.line_losses import LossWatch
 from hil_sim.nodes.plant import PlantNode
 from hil_sim.nodes.turns import LockStep, OnClock, PacedLockStep, Turn
 from hil_sim.plant.charger import Charger
-from hil_sim.plant.plant import Plant
+from hil_sim.plant.seam import PlantLike
 from hil_sim.run.charge import Charge, Progress
 from hil_sim.run.parts import EcuFactory, ecu_factory_of, injection_of, plant_of, sensors_of
 from hil_sim.run.result import RunResult
@@ -143,7 +143,7 @@ def run_plant(
 
 def _run(
     settings: Settings,
-    plant: Plant,
+    plant: PlantLike,
     bus: CanBus,
     database: dict[str, MessageCodec],
     turn: Turn,

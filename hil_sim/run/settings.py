@@ -10,6 +10,7 @@ from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.presets.schema import Initial
 from hil_sim.faults import Fault
+from hil_sim.plant.catalog import DEFAULT_PLANT
 from hil_sim.plant.disturbances import DisturbanceKind
 
 ANSWER_TIMEOUT_S = 1.0
@@ -46,3 +47,5 @@ class Settings:
     ends_early: bool = True
     initial: Initial | None = None
     """State of the cell at the start; that of the preset without."""
+    plant: str = DEFAULT_PLANT
+    """NAME or NAME:ARGUMENT of a plant, see hil_sim.plant.catalog."""
