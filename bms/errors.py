@@ -17,3 +17,7 @@ class ModelMismatchError(InputError):
 
 class BusError(BmsError):
     """A CAN bus that cannot be opened or does not answer."""
+
+
+class PlantError(BmsError):
+    """A simulated cell whose equations have no solution where the charge has driven it."""

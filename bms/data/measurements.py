@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -69,18 +69,26 @@ COLUMNS = tuple(field.name for field in fields(Measurements))
 def read_measurements(path: Path) -> Measurements:
     """Recording from a CSV file with a header row; columns beyond the six are ignored.
 
+    Raises InputError as read_columns does.
+    """
+    return Measurements(*read_columns(path, COLUMNS))
+
+
+def read_columns(path: Path, columns: Sequence[str]) -> Array:
+    """Columns of a CSV file with a header row, time_s first, as an array (columns, rows).
+
     Raises InputError, with file and line, for a missing column, a row of another length, text or
     a value that is not finite in place of a number, and time that does not rise.
     """
     rows = csv.reader(read_text(path).lstrip("\ufeff").splitlines())
     header = [name.strip() for name in _next_row(rows, path) or []]
-    missing = [name for name in COLUMNS if header.count(name) != 1]
+    missing = [name for name in columns if header.count(name) != 1]
     if missing:
         raise InputError(
             f"{path}:1: column {missing[0]} must be there once; "
-            f"give a CSV file with the columns {', '.join(COLUMNS)}"
+            f"give a CSV file with the columns {', '.join(columns)}"
         )
-    places = [header.index(name) for name in COLUMNS]
+    places = [header.index(name) for name in columns]
     values: list[list[float]] = []
     while (cells := _next_row(rows, path)) is not None:
         if not cells:
@@ -95,7 +103,7 @@ def read_measurements(path: Path) -> Measurements:
             raise InputError(f"{where}: time_s must rise from row to row; sort the file by time")
     if not values:
         raise InputError(f"{path}: holds no measurement; give a file with at least one row")
-    return Measurements(*np.array(values).T.copy())
+    return np.array(values).T.copy()
 
 
 def recording_sha256(path: Path) -> str:

@@ -57,6 +57,14 @@ FaultsOption = Annotated[
         "--faults", help="TOML file of faults to inject, see docs/faults.md. Default: none."
     ),
 ]
+PlantOption = Annotated[
+    str,
+    typer.Option(
+        "--plant",
+        help="The cell: two-mass, pybamm[:spme|dfn][,contact=OHM][,points=N], "
+        "recorded:CSV[,soc=START], or a plant of one's own; see docs/plants.md.",
+    ),
+]
 MaxTimeOption = Annotated[
     float,
     typer.Option("--max-time-s", min=0.1, help="End of the run in s after the charge began."),

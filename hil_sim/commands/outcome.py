@@ -41,6 +41,7 @@ def charge_settings(
     faults: Path | None,
     max_time_s: float,
     realtime: bool,
+    plant: str,
 ) -> Settings:
     """What the options that all charging commands have say of a run.
 
@@ -54,6 +55,7 @@ def charge_settings(
         faults=() if faults is None else load_faults(faults),
         max_time_s=max_time_s,
         realtime=realtime,
+        plant=plant,
     )
 
 

@@ -13,12 +13,14 @@ from hil_sim.commands import options
 from hil_sim.commands.outcome import charge_and_report, charge_settings
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.session import run_plant
+from hil_sim.run.settings import Settings
 
 
 def plant(
     bus: options.SharedBusOption,
     preset: PresetOption = DEFAULT_PRESET,
     seed: options.SeedOption = 0,
+    cell: options.PlantOption = Settings.plant,
     disturbance: options.DisturbanceOption = DisturbanceKind.NONE,
     faults: options.FaultsOption = None,
     out: options.OutOption = None,
@@ -43,7 +45,7 @@ def plant(
     Example: bms plant --bus socketcan:vcan0 --seed 1 --out out/run
     """
     settings = charge_settings(
-        load_preset(preset), bus, seed, disturbance, faults, max_time_s, realtime
+        load_preset(preset), bus, seed, disturbance, faults, max_time_s, realtime, cell
     )
     settings = replace(settings, answer_timeout_s=answer_timeout_s)
     return charge_and_report(settings, run_plant, out, as_json, log=log)

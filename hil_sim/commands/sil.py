@@ -42,6 +42,7 @@ def sil(
         ),
     ] = None,
     seed: options.SeedOption = 0,
+    plant: options.PlantOption = Settings.plant,
     disturbance: options.DisturbanceOption = DisturbanceKind.NONE,
     faults: options.FaultsOption = None,
     out: options.OutOption = None,
@@ -79,7 +80,7 @@ def sil(
         # Of an ECU elsewhere, preset and model are not a choice but what it has to have.
         cell, expected = load_pair(preset, model) if is_remote else (load_preset(preset), model)
         settings = replace(
-            charge_settings(cell, bus, seed, disturbance, faults, max_time_s, realtime),
+            charge_settings(cell, bus, seed, disturbance, faults, max_time_s, realtime, plant),
             controller=controller,
             model=expected,
         )

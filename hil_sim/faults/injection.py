@@ -18,7 +18,7 @@ from hil_sim.faults.plant import ChargerFault, PumpFailed
 from hil_sim.faults.sensors import SensorFault, SensorMemory
 from hil_sim.nodes.clock import Clock, WallClock
 from hil_sim.nodes.ecu import EcuLike
-from hil_sim.plant.plant import Plant
+from hil_sim.plant.seam import PlantLike
 from hil_sim.plant.sensors import Readings
 
 
@@ -69,7 +69,7 @@ class Injection:
             if isinstance(fault, ClockJitter)
         ]
 
-    def begin(self, charge_period: int | None, plant: Plant) -> None:
+    def begin(self, charge_period: int | None, plant: PlantLike) -> None:
         """Open a period: its number since the start of the charge, None before that."""
         if not self._windows:
             return
@@ -146,7 +146,7 @@ class Injection:
     def _is_active(self, condition: Callable[[Fault], bool]) -> bool:
         return any(condition(self._windows[n][0]) for n in self._active)
 
-    def _set_pump(self, plant: Plant) -> None:
+    def _set_pump(self, plant: PlantLike) -> None:
         has_failed = self._is_active(lambda fault: isinstance(fault, PumpFailed))
         if has_failed and self._healthy_power_W is None:
             self._healthy_power_W, plant.cooling_power_W = plant.cooling_power_W, 0.0

@@ -10,7 +10,7 @@ from bms.presets import Preset
 from hil_sim.bus.catalog import Message
 from hil_sim.bus.database import MessageCodec
 from hil_sim.bus.e2e import Receiver
-from hil_sim.plant.plant import Plant
+from hil_sim.plant.seam import PlantLike
 
 
 class View(Protocol):
@@ -30,7 +30,7 @@ class View(Protocol):
 class TrueState:
     """The state of the simulated cell itself, for methods that assume it is known."""
 
-    def __init__(self, plant: Plant) -> None:
+    def __init__(self, plant: PlantLike) -> None:
         self._plant = plant
 
     def receive(self, frame_id: int, data: bytes) -> None:

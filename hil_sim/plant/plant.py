@@ -21,6 +21,8 @@ class Extremes:
     surface_temperature_K: float
     voltage_V: float
     soc: float
+    min_anode_potential_V: float | None = None
+    """Least, where the plant has electrodes: lithium plates below 0."""
 
     def violations(self, limits: Limits) -> list[str]:
         """Each limit that was exceeded, by however little, as text with both figures."""
@@ -60,7 +62,6 @@ class Plant:
         self._step_s = preset.timing.sampling_period_s / SUB_STEPS
         self._source = disturbance
         self._knot = next(disturbance)
-        self.plug_in_soc = true_cell.plug_in_soc
         self.cooling_power_W = true_cell.cooling_power_W
         self.current_A = 0.0
         self.state = true_cell.state

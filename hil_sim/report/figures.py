@@ -53,6 +53,10 @@ def figures(limits: Limits, results: list[RunResult]) -> list[Figure]:
     for name, key, pattern in free:
         values = [_text(getattr(summary, key), pattern) for summary in summaries]
         rows.append(Figure(name, values, "", [None] * len(values)))
+    potentials_V = [summary.min_anode_potential_V for summary in summaries]
+    if any(potential_V is not None for potential_V in potentials_V):
+        texts = [_text(potential_V, "{:.4f} V") for potential_V in potentials_V]
+        rows.append(Figure("Least anode potential", texts, "", [None] * len(texts)))
     losses = [summary.line_losses for summary in summaries]
     if any(loss is not None for loss in losses):
         texts = [_text(None if loss is None else loss.total, "{}") for loss in losses]

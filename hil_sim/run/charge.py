@@ -13,7 +13,7 @@ from hil_sim.bus.refusal import refusal_text
 from hil_sim.faults import Injection
 from hil_sim.nodes.plant import Answer, PlantNode, Request
 from hil_sim.plant.charger import Charger
-from hil_sim.plant.plant import Plant
+from hil_sim.plant.seam import PlantLike
 from hil_sim.plant.sensors import Readings, SensorSuite
 from hil_sim.run.result import (
     STOP_COMPLETE,
@@ -44,7 +44,7 @@ class Charge:
 
     preset: Preset
     node: PlantNode
-    plant: Plant
+    plant: PlantLike
     sensors: SensorSuite
     charger: Charger
     injection: Injection
@@ -52,6 +52,8 @@ class Charge:
     ends_early: bool = True
     model_hash: str | None = None
     """The model that the ECU has to have; None for any."""
+    plug_in_soc: float | None = None
+    """State of charge that the charger tells the ECU; None for the true one."""
     progress: Progress = lambda soc: None
 
     def __post_init__(self) -> None:
@@ -63,7 +65,9 @@ class Charge:
         self.first_fault: int | None = None
         self._edge: int | None = None
         self._silent_periods = 0
-        self._plug_in_soc = self.plant.plug_in_soc
+        self._plug_in_soc = (
+            self.plant.state.soc if self.plug_in_soc is None else self.plug_in_soc
+        )
 
     def run(self) -> str:
         """Run to the end and return why it ended.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,14 +15,16 @@ from hil_sim.faults import Injection
 from hil_sim.nodes.ecu import EcuLike
 from hil_sim.nodes.python_ecu import PythonEcu
 from hil_sim.nodes.views import BusMeasurements, TrueState
+from hil_sim.plant.catalog import make_plant
 from hil_sim.plant.charger import Charger
 from hil_sim.plant.disturbances import disturbance_source
 from hil_sim.plant.plant import SUB_STEPS, Plant
+from hil_sim.plant.seam import PlantLike
 from hil_sim.plant.sensors import SensorSuite
 from hil_sim.plant.true_cell import nominal_cell
 from hil_sim.run.settings import ControllerKind, Settings
 
-EcuFactory = Callable[[Plant, "dict[str, MessageCodec]"], EcuLike]
+EcuFactory = Callable[[PlantLike, "dict[str, MessageCodec]"], EcuLike]
 
 
 def _seeds(seed: int) -> list[np.random.SeedSequence]:
@@ -38,14 +41,16 @@ def injection_of(settings: Settings, database: dict[str, MessageCodec]) -> Injec
     return Injection(settings.faults, period_s, _seeds(settings.seed)[2], database)
 
 
-def plant_of(settings: Settings) -> Plant:
-    """The cell at its start, with its disturbance: that of the preset or another one."""
+def plant_of(settings: Settings) -> PlantLike:
+    """The plant of the settings at its start, with its disturbance; InputError without it."""
     preset = settings.preset
     step_s = preset.timing.sampling_period_s / SUB_STEPS
     rng = np.random.default_rng(_seeds(settings.seed)[0])
     disturbance = disturbance_source(settings.disturbance, preset, step_s, rng)
-    true_cell = settings.true_cell or nominal_cell(preset, settings.initial)
-    return Plant(preset, disturbance, true_cell)
+    if settings.true_cell is not None:
+        return Plant(preset, disturbance, settings.true_cell)
+    started = replace(preset, initial=settings.initial or preset.initial)
+    return make_plant(settings.plant, started, disturbance)
 
 
 def sensors_of(settings: Settings) -> SensorSuite:

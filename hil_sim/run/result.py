@@ -12,6 +12,7 @@ from hil_sim.faults.injection import InjectedFault
 from hil_sim.nodes.line_losses import LineLosses
 from hil_sim.nodes.plant import Answer
 from hil_sim.nodes.punctuality import PlantWatch, Timing
+from hil_sim.plant.catalog import DEFAULT_PLANT
 
 
 @dataclass
@@ -106,6 +107,9 @@ class Summary:
     timing: Timing | None = None
     line_losses: LineLosses | None = None
     """Frames lost on the serial line to the ECU; None where there is no such line."""
+    plant: str = DEFAULT_PLANT
+    min_anode_potential_V: float | None = None
+    """Least over the run; None where the plant has no electrodes."""
 
     def to_json(self) -> dict[str, Any]:
         """Plain mapping in the order of the fields."""

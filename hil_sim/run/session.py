@@ -19,7 +19,7 @@ from hil_sim.nodes.ecu import EcuNode
 from hil_sim.nodes.line_losses import LossWatch
 from hil_sim.nodes.plant import PlantNode
 from hil_sim.nodes.turns import LockStep, OnClock, PacedLockStep, Turn
-from hil_sim.plant.plant import Plant
+from hil_sim.plant.seam import PlantLike
 from hil_sim.run.charge import Charge, Progress
 from hil_sim.run.parts import (
     EcuFactory,
@@ -149,7 +149,7 @@ def run_plant(
 
 def _run(
     settings: Settings,
-    plant: Plant,
+    plant: PlantLike,
     bus: CanBus,
     database: dict[str, MessageCodec],
     turn: Turn,
@@ -177,6 +177,7 @@ def _run(
         max_time_s=settings.max_time_s,
         ends_early=settings.ends_early,
         model_hash=model.hash if is_firmware and isinstance(model, KanModel) else None,
+        plug_in_soc=settings.true_cell.plug_in_soc if settings.true_cell else None,
         progress=progress,
     )
     start_s = time.perf_counter()

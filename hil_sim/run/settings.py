@@ -10,6 +10,7 @@ from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.presets.schema import Initial
 from hil_sim.faults import Fault
+from hil_sim.plant.catalog import DEFAULT_PLANT
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.plant.true_cell import TrueCell
 
@@ -50,3 +51,5 @@ class Settings:
     true_cell: TrueCell | None = None
     """The cell as it truly is, with its charger and sensors, in place of the preset's at `initial`.
     """
+    plant: str = DEFAULT_PLANT
+    """NAME or NAME:ARGUMENT of a plant, see hil_sim.plant.catalog."""

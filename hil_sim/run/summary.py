@@ -65,6 +65,8 @@ def sum_up(
         if watch is not None
         else None,
         line_losses=losses if is_serial_line(settings.bus) else None,
+        plant=settings.plant,
+        min_anode_potential_V=extremes.min_anode_potential_V,
     )
     return RunResult(summary, series, watch)
 
