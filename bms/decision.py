@@ -6,7 +6,17 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-ACTIVE_CONSTRAINTS = ("none", "voltage", "soc", "core", "surface", "infeasible", "invalid", "map", "core_unknown")
+ACTIVE_CONSTRAINTS = (
+    "none",
+    "voltage",
+    "soc",
+    "core",
+    "surface",
+    "infeasible",
+    "invalid",
+    "map",
+    "core_unknown",
+)
 """Names in the order of the firmware's enumeration rcbf_active_t."""
 
 

@@ -96,13 +96,20 @@ def ohmic_ohm(cell: CellParameters, temperature_K: Array) -> tuple[Array, Array]
     return ohm.min(axis=1), ohm.max(axis=1)
 
 
+def temperatures_K(cell: CellParameters, low_K: float, high_K: float) -> Array:
+    """Temperatures of a range, close together and with every point of the cell's table in it."""
+    points = () if cell.resistance is None else cell.resistance.temperature_K
+    kinks = [point for point in points if low_K < point < high_K]
+    return np.union1d(np.linspace(low_K, high_K, 10 * _SAMPLES), kinks)
+
+
 def warmest_resistance_ohm(preset: Preset, grid_K: Array) -> Array:
     """Greatest resistance of the family at each temperature of a grid and all warmer ones.
 
     What is linear between the values is nowhere below the resistance.
     """
     interval = family_of(preset)
-    fine_K = np.unique(np.concatenate([np.linspace(grid_K[0], grid_K[-1], 20 * _SAMPLES), grid_K]))
+    fine_K = np.union1d(temperatures_K(preset.cell, grid_K[0], grid_K[-1]), grid_K)
     _, greatest = ohmic_ohm(preset.cell, fine_K)
     envelope = np.maximum.accumulate(greatest[::-1])[::-1] * interval.resistance[1]
     nodes = np.interp(grid_K, fine_K, envelope)
@@ -247,4 +254,3 @@ def current_error_A(preset: Preset, bus: BusQuantisation = BUS) -> float:
 def exponential_share(period_s: float, time_s: float) -> float:
     """Share of its way that a first-order lag goes in a period; 1 without lag."""
     return 1.0 if time_s == 0.0 else 1.0 - math.exp(-period_s / time_s)
-

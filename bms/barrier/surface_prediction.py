@@ -31,6 +31,8 @@ class SurfacePrediction:
     transition: Array
     gain_K_per_W: Array
     gain_coolant: Array
+    ohmic_resistance_ohm: float
+    entropic_coefficient_V_per_K: float
     error_bound_K: float
 
 
@@ -40,12 +42,18 @@ def surface_prediction(
     """Exact discretisation for the preset's period, inputs held, of the cell's two-mass model.
 
     The bound covers the preset's disturbances, the errors of the current, coolant and surface
-    sensors and of the bus, for a cell that was at rest when the prediction began. Raises InputError
-    for a cell that the entropic heat alone would run away with.
+    sensors and of the bus, for a cell that was at rest when the prediction began. Of a family it is
+    the coldest cell that is predicted. Raises InputError for a cell that the entropic heat alone
+    would run away with.
     """
     # Imported here, so that an ECU with the compiled-in constants starts without SciPy.
     from scipy.linalg import expm  # noqa: PLC0415
 
+    bound_K = None
+    if cell.interval is not None:
+        from bms.barrier.family_surface import coldest_cell, family_error_bound_K  # noqa: PLC0415
+
+        bound_K, cell = family_error_bound_K(preset), coldest_cell(preset)
     rc, cc = cell.core_resistance_K_per_W, cell.core_heat_capacity_J_per_K
     rs, cs = cell.surface_resistance_K_per_W, cell.surface_heat_capacity_J_per_K
     augmented = np.zeros((4, 4))
@@ -53,7 +61,12 @@ def surface_prediction(
     augmented[1] = [1.0 / (rc * cs), -1.0 / (rc * cs) - 1.0 / (rs * cs), 0.0, 1.0 / (rs * cs)]
     discrete = expm(augmented * preset.timing.sampling_period_s)
     return SurfacePrediction(
-        discrete[:2, :2], discrete[:2, 2], discrete[:2, 3], _error_bound_K(cell, preset, bus)
+        discrete[:2, :2],
+        discrete[:2, 2],
+        discrete[:2, 3],
+        cell.ohmic_resistance_ohm,
+        cell.entropic_coefficient_V_per_K,
+        _error_bound_K(cell, preset, bus) if bound_K is None else bound_K,
     )
 
 

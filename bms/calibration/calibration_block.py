@@ -116,7 +116,7 @@ def _thermal_fields(preset: Preset) -> dict[str, Any]:
         "transition": prediction.transition.ravel().tolist(),
         "gain_K_per_W": prediction.gain_K_per_W.tolist(),
         "gain_coolant": prediction.gain_coolant.tolist(),
-        "ohmic_resistance_ohm": preset.cell.ohmic_resistance_ohm,
-        "entropic_coefficient_V_per_K": preset.cell.entropic_coefficient_V_per_K,
+        "ohmic_resistance_ohm": prediction.ohmic_resistance_ohm,
+        "entropic_coefficient_V_per_K": prediction.entropic_coefficient_V_per_K,
         "error_bound_K": prediction.error_bound_K,
     }

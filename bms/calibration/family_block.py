@@ -38,7 +38,8 @@ def family_fields(preset: Preset) -> dict[str, Any]:
         preset.limits.max_core_temperature_K,
         bounds.TEMPERATURES,
     )
-    least_ohm = float(bounds.ohmic_ohm(cell, np.linspace(grid_K[0], grid_K[-1], 400))[0].min())
+    fine_K = bounds.temperatures_K(cell, float(grid_K[0]), float(grid_K[-1]))
+    least_ohm = float(bounds.ohmic_ohm(cell, fine_K)[0].min())
     outflow_W_per_K = 1.0 / ends.core_resistance[1]
     gain_W_per_K = (
         outflow_W_per_K

@@ -12,8 +12,11 @@ from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands import options
+from bms.commands.family_tables import print_family
+from bms.errors import InputError
+from bms.model.model_file import KanModel
 from bms.model.pair import load_pair
-from bms.presets import DEFAULT_PRESET
+from bms.presets import DEFAULT_PRESET, Preset
 from bms.verification import (
     CLASHING_DELTA4,
     LARGEST_BOXES,
@@ -25,6 +28,7 @@ from bms.verification import (
 )
 from bms.verification import verify as certify
 from bms.verification.closed_loop import HORIZON_S, SlipCost, slip_cost
+from bms.verification.family import FAMILY_PARTS, verify_family
 from bms.verification.findings import Finding
 from bms.verification.search import CounterExample
 from bms.waiting import waiting
@@ -54,6 +58,13 @@ def verify(
     Example: bms verify --preset lin2014 --json
     """
     pair = load_pair(preset, model)
+    if pair[0].cell.interval is not None:
+        if slips or formulas is not Formulas.CORRECTED:
+            raise InputError(
+                f"--preset {preset}: the paper's formulas know no family of cells; leave out "
+                "--slips and --formulas, or take a preset without cell.interval"
+            )
+        return _verify_family(*pair, as_json)
     costs = []
     shown = ((), *((slip,) for slip in (*SLIPS, CLASHING_DELTA4)), SLIPS) if slips else ()
     with waiting("verifying", (1 + len(shown)) * PARTS + len(shown), "parts") as wait:
@@ -71,6 +82,16 @@ def verify(
         _print(result)
         if costs:
             _print_costs(costs)
+    return EXIT_DONE if result.certified else EXIT_CHECK_FAILED
+
+
+def _verify_family(preset: Preset, model: KanModel, as_json: bool) -> int:
+    with waiting("verifying the family", FAMILY_PARTS, "parts") as wait:
+        result = verify_family(preset, model, note=wait.begin)
+    if as_json:
+        typer.echo(json.dumps(result.as_dict(), indent=1))
+    else:
+        print_family(result)
     return EXIT_DONE if result.certified else EXIT_CHECK_FAILED
 
 
