@@ -49,7 +49,7 @@ def identify(
     if out is not None and out.suffix != ".toml":
         raise InputError(f"--out {out}: a preset is a file with the ending .toml; change the name")
     start = load_preset(preset)
-    recording = read_measurements(data)
+    recording = read_measurements(data, core_may_be_copied=True)
     cut = training_rows(len(recording.time_s))
     try:
         with waiting("fitting from several starts") as wait:
