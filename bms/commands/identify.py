@@ -88,7 +88,7 @@ def _preset(start: Preset, result: Identification, name: str, data: str) -> Pres
         name=name,
         description=f"Preset {start.name} with thermal parameters identified from {data}",
         sources=(
-            f"{', '.join(fitted)}: identified from {data} by 'bms identify'",
+            f"{', '.join(fitted)}: identified from {data} by bms identify",
             *(f"preset {start.name}: {source}" for source in start.sources),
         ),
         cell=dataclasses.replace(start.cell, **fitted),
