@@ -58,7 +58,7 @@ def _root() -> None:
     """
 
 
-def _application(arguments: list[str]) -> TyperGroup:
+def application(arguments: list[str]) -> TyperGroup:
     """Application with the command that is asked for, or with all when none is named."""
     commands = {entry.name: entry for entry in entry_points(group="bms.commands")}
     wanted = arguments[0] if arguments else ""
@@ -76,7 +76,7 @@ def main() -> None:
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     try:
-        code = _application(sys.argv[1:])(standalone_mode=False)
+        code = application(sys.argv[1:])(standalone_mode=False)
     except BmsError as error:
         print(f"bms: {error}", file=sys.stderr)
         sys.exit(EXIT_WRONG_USE)

@@ -10,8 +10,8 @@ import typer
 from bms.commands import options
 from bms.errors import InputError
 from bms.image import calibration_part
-from bms.model.model_file import load_model, load_shipped_model
-from bms.presets import DEFAULT_PRESET, load_preset
+from bms.model.pair import load_pair
+from bms.presets import DEFAULT_PRESET
 from codegen.calibration_source import calibration_source
 from codegen.can_sources import can_sources
 from codegen.core_sources import core_sources, write_core
@@ -46,8 +46,7 @@ def export(
     """
     if out is None and sources is None:
         raise InputError("export: no folder is named; add --out DIR, --sources DIR or both")
-    chosen = load_preset(preset)
-    estimator = load_model(model) if model else load_shipped_model(chosen.name)
+    chosen, estimator = load_pair(preset, model)
     generated: dict[str, str | bytes] = {}
     if out is not None:
         generated = {

@@ -84,7 +84,7 @@ def _from_preset(
     model: KanModel, name: str, seed: int, confidence: float, progress: Progress
 ) -> Found:
     preset = load_preset(name)
-    check_pair(preset, model)
+    check_pair(preset, model, name)
     network, data_seed = model.network, model.training.settings.seed
     training, held_out = (
         joined(simulated_split(preset, split, data_seed, lags=network.lags).values())

@@ -157,7 +157,8 @@ def _warnings(models: list[NamedModel], data: Path | None, preset: Preset) -> li
     ]
     if not models:
         warnings.append(
-            "no network in the table; train one with 'bms train --data' and give it as --model"
+            f"no network in the table; train one with 'bms train --data {data} --lagged "
+            "--out model.json' and give it as --model model.json"
         )
     return warnings
 

@@ -57,7 +57,7 @@ def evaluate(
     else:
         assert preset is not None
         chosen = load_preset(preset)
-        check_pair(chosen, loaded)
+        check_pair(chosen, loaded, preset)
         seed = loaded.training.settings.seed
         lags = loaded.network.lags
         samples = joined(simulated_split(chosen, "evaluation", seed, lags=lags).values())

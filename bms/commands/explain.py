@@ -108,7 +108,8 @@ def _inputs(model: KanModel, data: Path | None, preset: str | None) -> tuple[Arr
         center, half = np.array(network.input_center), np.array(network.input_half_range)
         return center + half * points, "uniform over the box"
     if data is not None:
-        return read_measurements(data).samples(network.lags).inputs, data.name
+        recording = read_measurements(data, core_may_be_copied=True)
+        return recording.samples(network.lags).inputs, data.name
     name = preset or model.preset
     if name is None:
         raise InputError(

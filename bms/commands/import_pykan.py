@@ -19,7 +19,7 @@ from bms.kan.network import INPUT_NAMES
 from bms.kan.scaling import Scaling
 from bms.model.model_file import KanModel, save_model
 from bms.presets import DEFAULT_PRESET, Preset, load_preset
-from bms.pykan_import import imported_model, imported_network, read_checkpoint
+from bms.pykan_import import imported_model, imported_network, read_checkpoint, with_all_inputs
 from bms.tables import network_tables
 from bms.waiting import waiting
 
@@ -41,6 +41,10 @@ def import_pykan(
         str | None,
         typer.Option("--half-range", help="Half width of each input, pykan's x = 1 above middle."),
     ] = None,
+    input_id: Annotated[
+        str | None,
+        typer.Option("--input-id", help="pykan's input_id of a network after prune_input: 0,2,3."),
+    ] = None,
     output_center_K: Annotated[
         float, typer.Option("--output-center", help="Core temperature (K) at pykan's output 0.")
     ] = 0.0,
@@ -53,15 +57,18 @@ def import_pykan(
 
     The four inputs are current, cooling power, surface and coolant temperature; another number of
     inputs is imported without test, for evaluation only. Beyond a grid pykan's splines silently
-    become 0; here the last value is kept and the estimate flagged. Edges that were fixed to a
-    symbol are refused. Without --data the errors are those on the preset's test profiles.
+    become 0; here the last value is kept and the estimate flagged. Edges that were fixed to another
+    symbol than 0 are refused. Without --data the errors are those on the preset's test profiles.
 
     Example: bms import-pykan model/0.1 --out model.json --output-center 300 --output-half-range 20
     """
     chosen = load_preset(preset)
     if not output_half_range_K > 0.0:
         raise InputError("--output-half-range: must be above 0")
-    source = read_checkpoint(checkpoint)
+    source = with_all_inputs(
+        read_checkpoint(checkpoint),
+        None if input_id is None else options.number_list("--input-id", input_id, int, "0,2,3"),
+    )
     if data is not None and len(source.layers[0].knots) != len(INPUT_NAMES):
         raise InputError(
             f"--data: cannot test {checkpoint}, which has not the four inputs; leave it out"

@@ -9,6 +9,7 @@ from bms.calibration import NO_CHANGES, calibration_fields
 from bms.errors import InputError, ModelMismatchError
 from bms.firmware._firmware import ffi, lib
 from bms.model.model_file import KanModel
+from bms.native_build import ROOT
 from bms.presets import DEFAULT_PRESET, Preset, load_preset
 
 
@@ -54,12 +55,63 @@ def calibration_block(
         ):
             raise ModelMismatchError(
                 f"compiled-in tables are not those of preset '{preset.name}' and its model; "
-                "run 'make generate' and install again"
+                + _regeneration()
             )
         block = ffi.new("bms_calibration_t *", calibration_fields(preset, model, changes))
     if not lib.calibration_is_valid(block):
         raise InputError(
-            f"preset '{preset.name}' with model {model.hash[:8]}: a constant is out of the range "
-            "that the firmware accepts; check cell, limits and gains"
+            f"preset '{preset.name}' with model {model.hash[:8]}: the firmware does not accept "
+            f"{_refused(calibration_fields(preset, model, changes))}; check cell, limits and gains "
+            f"with 'bms verify --preset PRESET'"
         )
     return block
+
+
+def _regeneration() -> str:
+    if (ROOT / "Makefile").is_file():
+        return "run 'make generate' and 'make build'"
+    return "install it again with 'pip install --force-reinstall kan-rcbf-bms'"
+
+
+def _refused(fields: Mapping[str, Any]) -> str:
+    """Names and values of the constants without which the block would be accepted.
+
+    Each is tried alone in an otherwise good block, the compiled-in one.
+    """
+    wrong = []
+    for names, values in _constants(fields).items():
+        block = ffi.new("bms_calibration_t *", lib.host_default_calibration()[0])
+        for path, value in values.items():
+            _put(block, path, value)
+        if not lib.calibration_is_valid(block):
+            shown = [f" {value:.6g}" for value in values.values() if isinstance(value, float)]
+            wrong.append(names + "".join(shown))
+    return ", ".join(wrong) or "the network of the model"
+
+
+def _constants(fields: Mapping[str, Any]) -> dict[str, dict[tuple[str, ...], Any]]:
+    """What is good or bad by itself, by name; the tables of the network belong together."""
+    found: dict[str, dict[tuple[str, ...], Any]] = {}
+
+    def collect(section: Mapping[str, Any], path: tuple[str, ...]) -> None:
+        for name, value in section.items():
+            here = (*path, name)
+            if name == "kan":
+                continue
+            if isinstance(value, Mapping) and not set(value) & {"high_K", "low_K"}:
+                collect(value, here)
+            elif isinstance(value, Mapping):
+                found[name] = {(*here, key): part for key, part in value.items()}
+            elif name.startswith("ocv_"):
+                found.setdefault("ocv", {})[here] = value
+            else:
+                found[".".join(here)] = {here: value}
+
+    collect(fields, ())
+    return found
+
+
+def _put(block: Any, path: tuple[str, ...], value: Any) -> None:
+    for name in path[:-1]:
+        block = getattr(block, name)
+    setattr(block, path[-1], value)

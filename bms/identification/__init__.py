@@ -1,5 +1,11 @@
 """Cell parameters from measured temperatures."""
 
-from bms.identification.identify import Identification, ParameterEstimate, Residuals, identify
+from bms.identification.identify import (
+    Identification,
+    NotIdentifiedError,
+    ParameterEstimate,
+    Residuals,
+    identify,
+)
 
-__all__ = ["Identification", "ParameterEstimate", "Residuals", "identify"]
+__all__ = ["Identification", "NotIdentifiedError", "ParameterEstimate", "Residuals", "identify"]

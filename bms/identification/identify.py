@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,6 +32,10 @@ ANCHOR = "core_heat_capacity_J_per_K"
 UNSEEN = "coolant_heat_capacity_J_per_K"
 """Kept: the measured coolant temperature is an input of the fit."""
 
+CORRECTIONS = ("surface_heat_capacity_J_per_K", "entropic_coefficient_V_per_K")
+"""May keep the start's value where the temperatures hardly depend on it; the others may not."""
+
+_CORE_RESISTANCE = "core_resistance_K_per_W"
 _ENTROPIC = "entropic_coefficient_V_per_K"
 _ENTROPIC_UNIT_V_PER_K = 1e-4
 _LARGEST_CHANGE = math.log(100.0)
@@ -52,6 +56,20 @@ _SAME_MINIMUM = 1e-4
 _MOST_STEPS = 40
 """A fit that takes more wanders along a direction that the data do not fix."""
 _FEWEST_ROWS = 100
+_AT_BOUND = 0.99
+"""Share of the reach of the search; a fit that ends beyond it was stopped by the bound."""
+_KEPT = "kept: not identifiable from these data"
+
+
+class NotIdentifiedError(InputError):
+    """No parameter at all can be identified; `reasons` are by parameter."""
+
+    def __init__(self, reasons: Mapping[str, str]) -> None:
+        super().__init__(
+            "no parameter can be identified from these data; "
+            "record a current that heats the core by some kelvin"
+        )
+        self.reasons = dict(reasons)
 
 
 @dataclass(frozen=True)
@@ -79,6 +97,8 @@ class Identification:
     """A cell fitted to a recording: parameters, residuals, and correlations between them.
 
     `correlation` has the order of `correlated`, the names of the fitted parameters.
+    `not_identified` has the reasons, by name, of parameters that the data do not tell though the
+    temperatures depend on them; with any, the cell is none to build on.
     """
 
     cell: CellParameters
@@ -89,6 +109,7 @@ class Identification:
     correlation: Array
     starts: int
     starts_at_minimum: int
+    not_identified: Mapping[str, str]
 
     @property
     def strongest_correlation(self) -> tuple[str, str, float] | None:
@@ -110,8 +131,9 @@ def identify(
 
     Least squares on the trajectory simulated from the first of `rows` (a slice with step 1; None
     means all) with the measured current and coolant temperature; rows after them are held out and
-    simulated on. What the data do not identify keeps the start's value, and the others are fitted
-    anew; `progress` is that of the present fit. InputError for fewer than 100 rows to fit.
+    simulated on. What the data do not identify, or only at the bound of the search, keeps the
+    start's value, and the others are fitted anew; `progress` is that of the present fit. InputError
+    for fewer than 100 rows to fit, NotIdentifiedError when nothing is left.
     """
     first, stop, _ = (rows or slice(None)).indices(len(measurements.time_s))
     if stop - first < _FEWEST_ROWS:
@@ -125,21 +147,34 @@ def identify(
         ANCHOR: "kept: temperatures fix ratios only, this one sets the scale",
         UNSEEN: "kept: the measured coolant is an input",
     }
+    reasons: dict[str, str] = {}
+    if measurements.has_copied_core:
+        names.remove(_CORE_RESISTANCE)
+        remarks[_CORE_RESISTANCE] = _KEPT
+        reasons[_CORE_RESISTANCE] = "core_temperature_K equals surface_temperature_K in every row"
     while names:
         cell, jacobian, residuals_K, agreeing = _fit(start.cell, names, recording, progress)
         matrix = covariance(jacobian, residuals_K, smallest_noise_K)
         errors = np.sqrt(np.diag(matrix))
         # The flat direction of two parameters that only act together shows in both.
         excess = errors / [_limit(name) for name in names]
-        worst = int(np.argmax(excess))
-        if excess[worst] <= 1.0:
+        reach = np.abs(_values(cell, names) - _values(start.cell, names)) / [
+            _reach(name) for name in names
+        ]
+        worst = int(np.argmax(np.where(reach > _AT_BOUND, np.inf, excess)))
+        name = names[worst]
+        if reach[worst] > _AT_BOUND:
+            reasons[name] = _bound_reason(getattr(cell, name))
+        elif excess[worst] <= 1.0:
             break
-        remarks[names.pop(worst)] = "kept: not identifiable from these data"
+        elif name not in CORRECTIONS or _effect_K(cell, name, recording) > max(
+            float(np.sqrt(np.mean(residuals_K**2))), smallest_noise_K
+        ):
+            reasons[name] = _open_reason(name, errors[worst])
+        remarks[name] = _KEPT
+        names.pop(worst)
     else:
-        raise InputError(
-            "no parameter can be identified from these data; "
-            "record a current that heats the core by some kelvin"
-        )
+        raise NotIdentifiedError(reasons)
     by_name = dict(zip(names, errors))
     return Identification(
         cell,
@@ -160,6 +195,33 @@ def identify(
         correlation(matrix),
         len(_STRETCHES),
         agreeing,
+        {name: reasons[name] for name in FITTED if name in reasons},
+    )
+
+
+def _bound_reason(value: float) -> str:
+    return (
+        f"at the bound of the search ({value:.3g}); "
+        "check units, sign of the current and the preset to start from"
+    )
+
+
+def _open_reason(name: str, error: float) -> str:
+    width = (
+        f"by {error * _ENTROPIC_UNIT_V_PER_K:.1g} V/K"
+        if name == _ENTROPIC
+        else f"by a factor of {math.exp(min(error, 100.0)):.2g}"
+    )
+    return f"the data leave it open {width}; record pulses of current with rests between them"
+
+
+def _effect_K(cell: CellParameters, name: str, recording: Measurements) -> float:
+    """Root mean square by which the temperatures move when the parameter does, within its limit."""
+    base_K = np.array(thermal_trajectory(cell, recording))
+    (value,) = _values(cell, [name])
+    return max(
+        float(np.sqrt(np.mean((np.array(thermal_trajectory(moved, recording)) - base_K) ** 2)))
+        for moved in (_cell(cell, [name], np.array([value + s * _limit(name)])) for s in (-1, 1))
     )
 
 

@@ -37,5 +37,8 @@ def _is_plain(value: object) -> bool:
 def _value(value: object) -> str:
     if isinstance(value, (tuple, list)):
         return "[" + ", ".join(_value(item) for item in value) + "]"
+    if isinstance(value, dict):
+        pairs = (f"{key} = {_value(v)}" for key, v in value.items() if v is not None)
+        return "{ " + ", ".join(pairs) + " }"
     # Strings of JSON are strings of TOML; repr of a float is a TOML float that reads back the same.
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)

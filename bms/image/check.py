@@ -26,7 +26,7 @@ REASONS = {
     "IMAGE_WRONG_FIRMWARE_VERSION": "is for another firmware version",
     "IMAGE_WRONG_CONTENT": "has a header that is not its own",
 }
-_EXPORT = "make it with 'bms export'"
+_EXPORT = "make it with 'bms export --preset PRESET --model model.json --out out/export'"
 
 
 def check_image(image: bytes, target: str, origin: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import shlex
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from bms.files import write_text
 from bms.kan.accuracy import ErrorFigures
 from bms.kan.network import Network
 from bms.kan.settings import TrainingSettings
+from bms.presets import preset_names
 from bms.validation import NonNegative, parse, read_json, strict
 
 FORMAT_VERSION = 1
@@ -73,7 +75,7 @@ class KanModel:
         if self.format_version != FORMAT_VERSION:
             raise InputError(
                 f"format_version: {self.format_version} is not known, only {FORMAT_VERSION}; "
-                "train again with 'bms train'"
+                f"train again with {train_command(self.preset)}"
             )
         if not math.isclose(self.error_bound_K, math.fsum(self.error_bound_parts_K.values())):
             raise InputError("error_bound_K: must be the sum of error_bound_parts_K")
@@ -100,13 +102,13 @@ def load_model(path: Path) -> KanModel:
     if isinstance(content, dict) and "error_bound_K" in content and "error_bounds" not in content:
         raise InputError(
             f"{path}: error_bounds: missing, the file is older than this version of bms; "
-            "train the model again with 'bms train'"
+            f"train the model again with {train_command(content.get('preset'))}"
         )
     model = parse(KanModel, content, str(path))
     if stated != model.hash:
         raise InputError(
             f"{path}: hash: does not fit the content, the file is stale or edited; "
-            "write it anew with 'bms train'"
+            f"write it anew with {train_command(model.preset)}"
         )
     return model
 
@@ -126,12 +128,26 @@ def shipped_models() -> list[Path]:
     return sorted(_SHIPPED.glob("*.json"))
 
 
-def load_shipped_model(preset_name: str) -> KanModel:
-    """The model that ships for a preset; InputError when there is none."""
+def train_command(preset_name: str | None, given: str | Path | None = None) -> str:
+    """Quoted command that trains a model for a preset, or for measurements when there is none.
+
+    `given` is how the user names the preset: a name that ships or the path of its file.
+    """
+    if preset_name is None:
+        source = "--data CSV"
+    elif given is not None:
+        source = f"--preset {shlex.quote(str(given))}"
+    else:
+        source = f"--preset {preset_name if preset_name in preset_names() else 'PRESET.toml'}"
+    return f"'bms train {source} --out model.json'"
+
+
+def load_shipped_model(preset_name: str, given: str | Path | None = None) -> KanModel:
+    """The model that ships for a preset, `given` as in train_command; InputError without one."""
     path = shipped_model_path(preset_name)
     if not path.is_file():
         raise InputError(
             f"preset '{preset_name}': no model ships for it; train one with "
-            f"'bms train --preset {preset_name} --out model.json' and give it as --model"
+            f"{train_command(preset_name, given)} and give it as --model model.json"
         )
     return load_model(path)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from bms.errors import ModelMismatchError
 from bms.kan.network import INPUT_NAMES
-from bms.model.model_file import KanModel, load_model, load_shipped_model
+from bms.model.model_file import KanModel, load_model, load_shipped_model, train_command
 from bms.presets import Preset, load_preset
 
 
@@ -15,16 +15,24 @@ def load_pair(
 ) -> tuple[Preset, KanModel]:
     """Preset and model by name, path or object; without a model the one that ships with it.
 
-    Whether they belong together is for check_pair. Raises InputError for what cannot be read.
+    Raises InputError for what cannot be read, and what check_pair raises.
     """
+    given = None if isinstance(preset, Preset) else preset
     chosen = preset if isinstance(preset, Preset) else load_preset(preset)
     if isinstance(model, KanModel):
-        return chosen, model
-    return chosen, load_shipped_model(chosen.name) if model is None else load_model(Path(model))
+        loaded = model
+    else:
+        loaded = (
+            load_shipped_model(chosen.name, given) if model is None else load_model(Path(model))
+        )
+    check_pair(chosen, loaded, given)
+    return chosen, loaded
 
 
-def check_pair(preset: Preset, model: KanModel) -> None:
+def check_pair(preset: Preset, model: KanModel, given: str | Path | None = None) -> None:
     """Raise ModelMismatchError when the model does not belong to the preset.
+
+    `given` is how the user names the preset, for the remedy.
 
     That is, when it was trained for another cell, uncertainty or box, or has other inputs than the
     firmware's four, with filtered ones behind them.
@@ -41,5 +49,5 @@ def check_pair(preset: Preset, model: KanModel) -> None:
         raise ModelMismatchError(
             f"model {model.hash[:8]} was trained for preset '{model.preset}' with another cell, "
             f"box, sensors, period or limits than preset '{preset.name}' has; train it again with "
-            f"'bms train --preset {preset.name} --out model.json'"
+            f"{train_command(preset.name, given)} and give it as --model model.json"
         )

@@ -22,7 +22,7 @@ from bms.data.profiles import KINDS
 from bms.data.simulate import joined
 from bms.errors import BmsError, InputError, ModelMismatchError
 from bms.kan.accuracy import error_figures
-from bms.model.model_file import KanModel, load_model, save_model
+from bms.model.model_file import KanModel, load_model, save_model, train_command
 from bms.presets import Preset, load_preset
 
 _TOLERANCE = 1e-6
@@ -54,7 +54,7 @@ def restamped(model: KanModel, preset: Preset) -> KanModel:
         if not np.allclose(now, then, rtol=_TOLERANCE, atol=0.0):
             raise ModelMismatchError(
                 f"{name}: preset '{preset.name}' gives another one than is recorded, so the model "
-                "is not for this preset; train it again with 'bms train'"
+                f"is not for this preset; train it again with {train_command(preset.name)}"
             )
     return replace(model, training_hash=preset.training_hash)
 

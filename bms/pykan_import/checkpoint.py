@@ -21,6 +21,12 @@ from bms.validation import read_text
 
 _PARTS = ("_config.yml", "_state", "_cache_data")
 _BASE_FUNCTION = "silu"
+_BASE_FUNCTION_AS_OBJECT = "object:torch.nn.modules.activation.SiLU"
+"""What pykan's prune_input writes instead of the name."""
+_PYTHON_TAG = "tag:yaml.org,2002:python/"
+_ZERO_SYMBOL = "0"
+_CONSTANT_OF_AFFINE = 3
+"""Of a symbolic edge's a, b, c, d: it gives c f(a x + b) + d."""
 
 
 @dataclass(frozen=True)
@@ -40,21 +46,26 @@ class CheckpointLayer:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A network of pykan; `samples` (N, n_in) are the inputs that it saw last, if any."""
+    """A network of pykan; `samples` (N, n_in) are the inputs that it saw last, if any.
+
+    `has_pruned_inputs` tells that pykan's prune_input made it; which inputs are left, its input_id,
+    is in none of the files.
+    """
 
     name: str
     state_sha256: str
     degree: int
     layers: tuple[CheckpointLayer, ...]
     samples: Array | None
+    has_pruned_inputs: bool
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
     """Checkpoint by the path that saveckpt was given, or by one of the files that it wrote.
 
     Raises InputError for files that are absent or not pykan's, and for what the firmware's network
-    has not: active symbolic edges, multiplication nodes, base functions other than silu, layers of
-    different degree.
+    has not: symbolic edges other than '0', multiplication nodes, base functions other than silu,
+    layers of different degree.
     """
     prefix = str(path)
     for part in _PARTS:
@@ -65,21 +76,30 @@ def read_checkpoint(path: Path) -> Checkpoint:
     where = f"{prefix}_state"
     if not isinstance(state, Mapping):
         raise InputError(f"{where}: holds no state of a network; write it with pykan's saveckpt")
-    if config.get("base_fun_name") != _BASE_FUNCTION:
+    base_function = config.get("base_fun_name")
+    if base_function not in (_BASE_FUNCTION, _BASE_FUNCTION_AS_OBJECT):
         raise InputError(
-            f"{prefix}_config.yml: base_fun_name: {config.get('base_fun_name')!r} on every edge "
+            f"{prefix}_config.yml: base_fun_name: {base_function!r} on every edge "
             f"is not supported; train with base_fun='{_BASE_FUNCTION}'"
         )
     widths, degree = _widths(config, prefix), _degree(config, prefix)
     try:
-        if config.get("symbolic_enabled", True):
-            for number in range(len(widths) - 1):
-                _refuse_symbolic(state, config, number, prefix)
-        layers = tuple(_layer(state, number) for number in range(len(widths) - 1))
+        layers = tuple(
+            _layer(
+                state,
+                number,
+                _symbolic_constants(state, config, number, prefix)
+                if config.get("symbolic_enabled", True)
+                else 0.0,
+            )
+            for number in range(len(widths) - 1)
+        )
+    except InputError:
+        raise
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(
             f"{where}: not laid out as pykan 0.2.8 does ({type(error).__name__}: {error}); "
-            "save it with that version"
+            "write it with that version: pip install pykan==0.2.8, then loadckpt and saveckpt"
         ) from None
     for number, layer in enumerate(layers):
         _check_shapes(
@@ -91,13 +111,19 @@ def read_checkpoint(path: Path) -> Checkpoint:
         degree,
         layers,
         _samples(Path(prefix + _PARTS[2]), widths[0]),
+        base_function == _BASE_FUNCTION_AS_OBJECT,
     )
 
 
 def _config(path: Path) -> dict[str, Any]:
     yaml = _module("yaml")
+
+    class Loader(yaml.SafeLoader):  # type: ignore[misc, name-defined]
+        """Takes a Python object for the name of its kind, and makes none."""
+
+    Loader.add_multi_constructor(_PYTHON_TAG, lambda loader, kind, node: kind)
     try:
-        content = yaml.safe_load(read_text(path))
+        content = yaml.load(read_text(path), Loader=Loader)
     except yaml.YAMLError:
         content = None
     if not isinstance(content, dict):
@@ -153,20 +179,25 @@ def _degree(config: Mapping[str, Any], prefix: str) -> int:
     return degree
 
 
-def _refuse_symbolic(
+def _symbolic_constants(
     state: Mapping[str, Any], config: Mapping[str, Any], number: int, prefix: str
-) -> None:
+) -> Array:
+    """What the symbolic edges add to each node, (out,): '0' a constant; others are refused."""
     active = _array(state[f"symbolic_fun.{number}.mask"])
     names = config[f"symbolic.funs_name.{number}"]
+    constants = active * _array(state[f"symbolic_fun.{number}.affine"])[..., _CONSTANT_OF_AFFINE]
     for target, source in np.argwhere(active != 0.0).tolist():
-        raise InputError(
-            f"{prefix}: layer {number}, edge {source} -> {target} is symbolic "
-            f"('{names[target][source]}'); call unfix_symbolic({number}, {source}, {target}) in "
-            "pykan, train and save again"
-        )
+        if names[target][source] != _ZERO_SYMBOL:
+            raise InputError(
+                f"{prefix}: layer {number}, edge {source} -> {target} is symbolic "
+                f"('{names[target][source]}'); call unfix_symbolic({number}, {source}, {target}) "
+                "in pykan, train and save again"
+            )
+    total: Array = np.sum(constants, axis=1)
+    return total
 
 
-def _layer(state: Mapping[str, Any], number: int) -> CheckpointLayer:
+def _layer(state: Mapping[str, Any], number: int, constants: Array | float) -> CheckpointLayer:
     part = {
         name: _array(state[f"act_fun.{number}.{name}"])
         for name in ("grid", "coef", "mask", "scale_base", "scale_sp")
@@ -175,13 +206,15 @@ def _layer(state: Mapping[str, Any], number: int) -> CheckpointLayer:
         name: _array(state[f"{name}_{number}"])
         for name in ("subnode_scale", "subnode_bias", "node_scale", "node_bias")
     }
+    scale = affine["node_scale"] * affine["subnode_scale"]
+    shift = affine["node_scale"] * affine["subnode_bias"] + affine["node_bias"]
     return CheckpointLayer(
         part["grid"],
         part["coef"],
         part["mask"] * part["scale_base"],
         part["mask"] * part["scale_sp"],
-        affine["node_scale"] * affine["subnode_scale"],
-        affine["node_scale"] * affine["subnode_bias"] + affine["node_bias"],
+        scale,
+        shift + scale * constants,
     )
 
 

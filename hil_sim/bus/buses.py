@@ -126,13 +126,13 @@ def require_room_for_ecu(name: str) -> None:
     """Raise InputError for a line or an adapter, which plant and ECU cannot share."""
     if name.startswith("slcan:") and not is_serial_line(name):
         raise InputError(
-            f"bus '{name}': one adapter is one party; use 'bms plant', and 'bms ecu' or the ECU at "
-            "another adapter, or a bus such as virtual:bms"
+            f"bus '{name}': one adapter is one party; use 'bms plant --bus BUS', and "
+            "'bms ecu --bus BUS' or the ECU at another adapter, or a bus such as virtual:bms"
         )
     if is_serial_line(name):
         raise InputError(
             f"bus '{name}': has one end here, and the ECU is at the other; use 'bms sil' or "
-            "'bms plant', or a bus such as virtual:bms"
+            "'bms plant --bus BUS', or a bus such as virtual:bms"
         )
 
 
@@ -141,7 +141,7 @@ def ecu_remedy(name: str) -> str:
     if is_serial_line(name):
         return (
             "see that an image with this firmware runs at its other end; "
-            "'bms flash' or 'make pil' starts one"
+            "'bms flash --image FILE --port PORT' starts one in QEMU"
         )
     return f"start 'bms ecu --bus {name}'"
 

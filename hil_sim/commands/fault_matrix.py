@@ -110,7 +110,7 @@ def _print(console: Console, result: MatrixResult, out: Path | None) -> None:
         ("latched", "right"),
     ):
         table.add_column(name, justify=justify)  # type: ignore[arg-type]
-    for verdict in result.verdicts:
+    for verdict in result.red_first:
         cells = (
             verdict.row.name,
             expected_text(verdict),

@@ -12,7 +12,7 @@ from bms.commands.options import JsonOption
 from bms.errors import InputError
 from hil_sim.commands.stopping import stop_event
 from hil_sim.targets import Emulation, Flash
-from hil_sim.targets.catalog import BOARD_NAMES, board_name
+from hil_sim.targets.catalog import BOARD_NAMES, DEFAULT_BOARD, board_name
 
 _POLL_S = 0.1
 
@@ -20,7 +20,7 @@ _POLL_S = 0.1
 def flash(
     target: Annotated[
         str, typer.Option("--target", help=f"Board: {' or '.join(BOARD_NAMES)}.")
-    ] = BOARD_NAMES[0],
+    ] = DEFAULT_BOARD,
     image: Annotated[
         Path | None,
         typer.Option("--image", help="Binary image of 'make firmware'. Default: what is in flash."),

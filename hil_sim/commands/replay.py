@@ -52,7 +52,8 @@ def replay(
         tuple[Path, Path] | None,
         typer.Option(
             "--against",
-            help="Compare two builds made by 'python -m bms.native_build' on a folder of logs.",
+            help="Compare two builds made by 'python -m bms.native_build --out FOLDER' on a folder "
+            "of logs.",
         ),
     ] = None,
     channel: ChannelOption = None,

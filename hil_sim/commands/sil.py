@@ -79,6 +79,8 @@ def sil(
             )
         # Of an ECU elsewhere, preset and model are not a choice but what it has to have.
         cell, expected = load_pair(preset, model) if is_remote else (load_preset(preset), model)
+        if not is_remote and ControllerKind.KAN_RCBF in (controller, baseline):
+            load_pair(preset, model)  # refused here, where the preset's file is known
         settings = replace(
             charge_settings(cell, bus, seed, disturbance, faults, max_time_s, realtime, plant),
             controller=controller,

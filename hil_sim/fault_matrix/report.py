@@ -26,6 +26,11 @@ class MatrixResult:
         return [verdict for verdict in self.verdicts if not verdict.passed]
 
     @property
+    def red_first(self) -> list[Verdict]:
+        """All verdicts, those that did not go as expected before the others."""
+        return sorted(self.verdicts, key=lambda verdict: verdict.passed)
+
+    @property
     def sentence(self) -> str:
         """In one sentence, whether all rows went as expected."""
         if self.red:
@@ -58,7 +63,7 @@ def matrix_json(result: MatrixResult) -> dict[str, Any]:
         "rows": len(result.verdicts),
         "red": len(result.red),
         "wall_time_s": round(result.wall_time_s, 3),
-        "results": [_row_json(verdict) for verdict in result.verdicts],
+        "results": [_row_json(verdict) for verdict in result.red_first],
     }
 
 
@@ -120,5 +125,5 @@ def matrix_page(result: MatrixResult) -> str:
         result=result,
         settings=result.settings,
         preset=result.settings.preset,
-        rows=[(v, expected_text(v), latch_text(v)) for v in result.verdicts],
+        rows=[(v, expected_text(v), latch_text(v)) for v in result.red_first],
     )

@@ -161,13 +161,17 @@ class Charge:
         if not self.preset.hash.startswith(identity.preset_hash):
             raise ModelMismatchError(
                 f"the ECU runs a preset with hash {identity.preset_hash}..., the plant "
-                f"'{self.preset.name}' with {self.preset.hash[:4]}...; give both one preset"
+                f"'{self.preset.name}' with {self.preset.hash[:4]}...; give the plant the "
+                "preset of the ECU by --preset, or start the ECU with that of the plant: "
+                "'bms ecu --bus BUS --preset PRESET', a board by 'bms export --preset PRESET --out "
+                "out/export' and 'bms flash --calibration out/export/calibration.bin'"
             )
         if self.model_hash is not None and not self.model_hash.startswith(identity.model_hash):
             raise ModelMismatchError(
                 f"the ECU runs a model with hash {identity.model_hash}..., not "
-                f"{self.model_hash[:8]}...; build its image with that model, or name with "
-                "--model the one that it has"
+                f"{self.model_hash[:8]}...; name with --model the one that it has, or give a board "
+                "that model: 'bms export --preset PRESET --model MODEL --out out/export' and "
+                "'bms flash --calibration out/export/calibration.bin'"
             )
 
     def _stop_reason(self, answer: Answer) -> str | None:

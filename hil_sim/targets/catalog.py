@@ -26,6 +26,8 @@ BUILD = Path("build") / "firmware"
 QEMU = "qemu:"
 LINUX = "linux"
 BOARD_NAMES = tuple(f"{QEMU}{board}" for board in sorted(BOARDS, reverse=True))
+DEFAULT_BOARD = f"{QEMU}mps2-an386"
+"""Whatever other boards there are."""
 NAMES = (LINUX, *BOARD_NAMES)
 
 
@@ -134,7 +136,7 @@ def find_board(name: str, build: Path = BUILD) -> QemuTarget:
     target = find_target(name, build)
     if isinstance(target, QemuTarget):
         return target
-    raise InputError(f"target '{name}': not a board; start it, then 'bms plant' on its bus")
+    raise InputError(f"target '{name}': not a board; start it, then 'bms plant --bus BUS'")
 
 
 def board_name(target: str) -> str:

@@ -67,7 +67,8 @@ class Flash:
         except OSError as error:
             raise InputError(
                 f"{path}: cannot be read ({error.strerror}); images are made by "
-                f"'{make_command(port_name(self._target))}', calibration parts by 'bms export'"
+                f"'{make_command(port_name(self._target))}', calibration parts by "
+                "'bms export --out out/export'"
             ) from None
 
     def _write(self, image: bytes) -> None:

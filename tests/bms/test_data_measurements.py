@@ -67,8 +67,10 @@ def test_missing_column_is_named(tmp_path, missing):
     [
         ([], r"a\.csv:1: column time_s"),
         ([HEADER], "no measurement"),
-        ([HEADER, ROW, ROW], r"a\.csv:3: time_s must rise"),
-        ([HEADER, ROW, "-1" + ROW[3:]], r"a\.csv:3: time_s must rise"),
+        ([HEADER, ROW, ROW], r"a\.csv:3: time_s must rise.*remove one of the two"),
+        ([HEADER, ROW, "-1" + ROW[3:]], r"a\.csv:3: time_s must rise.*sort"),
+        ([HEADER.replace(",", ";"), ROW.replace(",", ";")], r"a\.csv:1: .*separated by ';'"),
+        ([HEADER.replace(",", "\t"), ROW], r"a\.csv:1: .*separated by tabulators"),
         ([HEADER, ROW + ",9"], r"a\.csv:2: 7 values"),
         ([HEADER, ROW, "1.0,2.0"], r"a\.csv:3: 2 values"),
         ([HEADER + ",time_s", ROW + ",5"], r"a\.csv:1: column time_s"),

@@ -10,7 +10,8 @@ import pytest
 from bms.cell import CellState, integrate_step
 from bms.data.measurements import COLUMNS, Measurements, read_measurements
 from bms.errors import InputError
-from bms.identification import identify
+from bms.identification import NotIdentifiedError, identify
+from bms.identification.identify import CORRECTIONS, FITTED
 from bms.identification.preset_toml import preset_toml
 from bms.identification.trajectory import thermal_trajectory
 from bms.presets import load_preset, preset_names
@@ -160,14 +161,61 @@ def test_without_current_the_heat_sources_keep_the_presets_values_and_it_is_said
         assert name not in result.correlated
 
 
+def test_kept_correction_without_a_say_leaves_the_cell_usable():
+    """Noise of 2 K hides the reversible heat, which then moves the temperatures by less."""
+    slow = recorded(TRUTH, rows=600, noise_K=2.0, current_A=np.repeat([-9.0, 0.0, -15.0], 200))
+
+    result = identify(slow, START)
+
+    assert estimates(result)["entropic_coefficient_V_per_K"].standard_error is None
+    assert result.not_identified == {}
+
+
+def test_everything_identified_leaves_no_reason():
+    assert identify(recorded(TRUTH, rows=400), START).not_identified == {}
+
+
+def test_heat_without_current_is_not_identified():
+    result = identify(recorded(TRUTH, current_A=np.zeros(600)), START)
+
+    assert "ohmic_resistance_ohm" in result.not_identified
+    assert "pulses of current" in result.not_identified["ohmic_resistance_ohm"]
+
+
+@pytest.mark.parametrize(("factor", "is_identified"), [(95.0, True), (105.0, False)])
+def test_parameter_at_the_bound_of_the_search_is_not_identified(factor, is_identified):
+    """The search goes to 100 times the start on either side."""
+    name = "surface_resistance_K_per_W"
+    cell = dataclasses.replace(TRUTH, **{name: factor * getattr(START.cell, name)})
+
+    result = identify(recorded(cell), START)
+
+    assert (name not in result.not_identified) == is_identified
+    if is_identified:
+        assert getattr(result.cell, name) == pytest.approx(getattr(cell, name), rel=0.01)
+    else:
+        assert "at the bound of the search" in result.not_identified[name]
+        assert getattr(result.cell, name) == getattr(START.cell, name)
+
+
+def test_surface_in_the_place_of_the_core_tells_nothing_of_the_resistance_between_them():
+    recording = recorded(TRUTH)
+    copied = dataclasses.replace(recording, core_temperature_K=recording.surface_temperature_K)
+
+    result = identify(copied, START)
+
+    assert "equals surface_temperature_K" in result.not_identified["core_resistance_K_per_W"]
+
+
 def test_cell_at_rest_identifies_nothing():
     at_rest = dataclasses.replace(
         recorded(TRUTH, current_A=np.zeros(200)),
         **{f"{part}_temperature_K": np.full(200, 290.0) for part in ("core", "surface", "coolant")},
     )
 
-    with pytest.raises(InputError, match="no parameter can be identified"):
+    with pytest.raises(NotIdentifiedError, match="no parameter can be identified") as refused:
         identify(at_rest, START)
+    assert set(FITTED) - set(refused.value.reasons) <= set(CORRECTIONS)
 
 
 @pytest.mark.parametrize(("rows", "enough"), [(slice(99), False), (slice(100), True)])
@@ -241,6 +289,68 @@ def test_command_prints_what_was_not_identified(bms, csv):
     assert "core_heat_capacity_J_per_K" in text
     assert "kept" in text
     assert "strongest correlation" in text
+
+
+@pytest.mark.parametrize(
+    ("spoil", "named"),
+    [
+        (
+            lambda columns: {"core_temperature_K": columns["surface_temperature_K"]},
+            "core_resistance_K_per_W",
+        ),
+        (lambda columns: {"current_A": columns["current_A"] / 1e3}, "ohmic_resistance_ohm"),
+        (
+            lambda columns: {"core_temperature_K": columns["core_temperature_K"] + 80.0},
+            "surface_resistance_K_per_W",
+        ),
+        (
+            lambda columns: {
+                "current_A": np.zeros(450),
+                "surface_temperature_K": np.full(450, 290.0),
+                "coolant_temperature_K": np.full(450, 290.0),
+                "core_temperature_K": np.full(450, 290.0),
+            },
+            "ohmic_resistance_ohm",
+        ),
+    ],
+    ids=["core is surface", "current in kA", "core in another scale", "at rest"],
+)
+def test_what_is_not_identified_is_told_by_name_and_no_preset_is_written(
+    bms, tmp_path, spoil, named
+):
+    recording = recorded(TRUTH, rows=450, noise_K=0.01)
+    columns = {name: getattr(recording, name) for name in COLUMNS}
+    columns |= spoil(columns)
+    path = write_recording(tmp_path / "run.csv", rows=450, **columns)
+
+    code, _, err = bms("identify", "--data", path, "--out", tmp_path / "mine.toml")
+
+    lines = err.splitlines()
+    assert code == 1
+    assert any(line.startswith(f"bms: {named}: not identified: ") for line in lines)
+    assert all(": not identified: " in line for line in lines)
+    assert len(lines) == len({line.split(":")[1] for line in lines})
+    assert [item.name for item in tmp_path.iterdir()] == ["run.csv"]
+
+
+def test_json_holds_what_was_not_identified(bms, tmp_path):
+    recording = recorded(TRUTH, rows=450)
+    columns = {name: getattr(recording, name) for name in COLUMNS}
+    columns["core_temperature_K"] = columns["surface_temperature_K"]
+    path = write_recording(tmp_path / "run.csv", rows=450, **columns)
+
+    code, out, _ = bms("identify", "--data", path, "--json")
+
+    assert code == 1
+    assert "core_resistance_K_per_W" in json.loads(out)["not_identified"]
+
+
+@pytest.mark.skipif(not MEASURED.is_file(), reason="not run: no measured data in ../shared/data")
+def test_measured_drive_cycle_gives_a_preset(bms, tmp_path):
+    code, _, err = bms("identify", "--data", MEASURED, "--out", tmp_path / "mine.toml")
+
+    assert (code, err) == (0, "")
+    assert load_preset(tmp_path / "mine.toml").cell.ohmic_resistance_ohm > 0.008
 
 
 @pytest.mark.parametrize(

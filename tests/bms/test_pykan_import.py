@@ -15,7 +15,7 @@ from bms.kan.network import INPUT_NAMES
 from bms.kan.scaling import Scaling
 from bms.model.model_file import load_model, load_shipped_model
 from bms.presets import DEFAULT_PRESET, load_preset
-from bms.pykan_import import imported_model, imported_network, read_checkpoint
+from bms.pykan_import import imported_model, imported_network, read_checkpoint, with_all_inputs
 from bms.pykan_import.model import UNKNOWN_ERROR_K
 from tests.bms.kan_samples import write_recording
 
@@ -23,6 +23,10 @@ torch = pytest.importorskip("torch", reason="not run: PyTorch is not installed")
 kan = pytest.importorskip("kan", reason="not run: pykan is not installed")
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "pykan.md"
+CASES = Path(__file__).parents[3] / "shared" / "cases"
+needs_cases = pytest.mark.skipif(
+    not CASES.is_dir(), reason="not run: no failing inputs in ../shared/cases"
+)
 PARITY = 1e-5
 """Of the output's span."""
 
@@ -190,6 +194,118 @@ def test_symbolic_edge_is_refused_by_layer_and_edge_until_it_is_unfixed(tmp_path
     assert_same_values(model, network_of(model, tmp_path))
 
 
+def test_edge_fixed_to_zero_gives_the_constant_that_pykan_gives(tmp_path):
+    """pykan fits '0' as c * 0 + d, and d is not 0."""
+    model = trained((3, 2, 1))
+    model.fix_symbolic(0, 1, 0, "0", verbose=False, log_history=False)
+    model.fix_symbolic(1, 0, 0, "0", fit_params_bool=False, verbose=False, log_history=False)
+    with torch.no_grad():
+        model.subnode_scale_0.fill_(0.7)
+        model.node_scale_0.fill_(1.3)
+        model.symbolic_fun[1].affine.data[0, 0, 3] = 0.4
+
+    assert_same_values(model, network_of(model, tmp_path))
+
+
+@needs_cases
+def test_network_with_an_edge_fixed_to_zero_is_imported_with_pykans_values():
+    prefix = CASES / "13-pykan-symbolic-message" / "csym_zero"
+    assert_probe(prefix, None)
+
+
+def test_refusal_of_a_symbolic_edge_is_the_whole_message(tmp_path):
+    model = trained((2, 2, 1))
+    model.fix_symbolic(0, 1, 0, "sin", fit_params_bool=False, verbose=False, log_history=False)
+
+    told = refusal(saved(model, tmp_path))
+
+    assert told.startswith(f"{tmp_path / 'net'}: layer 0")
+    assert "Error" not in told
+    assert "pykan 0.2.8" not in told
+
+
+def assert_probe(prefix, input_id):
+    """pykan's own values, kept beside the checkpoint, wherever the estimate is trusted."""
+    checkpoint = with_all_inputs(read_checkpoint(prefix), input_id)
+    network = imported_network(checkpoint, Scaling(np.zeros(4), np.ones(4), 0.0, 1.0))
+    probe = np.load(f"{prefix}_probe.npz")
+    points = probe["x"]
+    if input_id is not None:
+        points = np.zeros((len(probe["x"]), 4))
+        points[:, input_id] = probe["x"][:, PROBE_COLUMNS]
+    values, in_domain = network.evaluate(points.astype(np.float64))
+    expected = probe["y"][:, 0]
+    assert np.mean(in_domain) > 0.9
+    assert np.abs(values - expected)[in_domain].max() <= PARITY * np.ptp(expected)
+
+
+PROBE_COLUMNS = [0, 2, 3, 4]
+"""Of the five inputs, those that the pruned network of the case was left with."""
+
+
+@needs_cases
+def test_network_after_prune_input_is_refused_until_its_inputs_are_named():
+    prefix = CASES / "14-pykan-prune-input" / "cprune_input5"
+    checkpoint = read_checkpoint(prefix)
+
+    with pytest.raises(InputError, match="give its input_id, such as --input-id 0,1,2,3"):
+        with_all_inputs(checkpoint, None)
+    with pytest.raises(InputError, match="0 current, 1 cooling power"):
+        with_all_inputs(checkpoint, [0, 2, 3, 4])
+    assert_probe(prefix, [0, 1, 2, 3])
+    assert_probe(prefix, [3, 0, 2, 1])
+
+
+@pytest.mark.parametrize("left", [[0, 2, 3], [3, 0], [2]])
+def test_pruned_network_reads_its_own_inputs_only(left, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # prune_input writes a log of its own
+    whole = trained((4, 2, 1))
+    pruned = whole.prune_input(active_inputs=left)
+    points = np.random.default_rng(2).uniform(-1.0, 1.0, (500, 4)).astype(np.float32)
+    pruned(torch.tensor(points))
+    checkpoint = with_all_inputs(read_checkpoint(saved(pruned, tmp_path)), left)
+
+    network = imported_network(checkpoint, Scaling(np.zeros(4), np.ones(4), 0.0, 1.0))
+
+    assert network.input_names == INPUT_NAMES
+    assert_same_values(pruned, network, trusted_share=0.9)
+    away = points.astype(np.float64)
+    for column in set(range(4)) - set(left):
+        away[:, column] = -away[:, column]
+    np.testing.assert_array_equal(
+        network.evaluate(away)[0], network.evaluate(points.astype(np.float64))[0]
+    )
+
+
+@pytest.mark.parametrize("given", [[0, 2], [0, 2, 2], [0, 2, 4], [-1, 0, 2]])
+def test_input_id_that_does_not_fit_is_refused(given, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # prune_input writes a log of its own
+    pruned = trained((4, 1, 1)).prune_input(active_inputs=[0, 2, 3])
+
+    with pytest.raises(InputError, match="--input-id"):
+        with_all_inputs(read_checkpoint(saved(pruned, tmp_path)), given)
+
+
+def test_base_function_as_an_object_is_read_without_making_it(tmp_path):
+    prefix = saved(untrained((2, 1)), tmp_path)
+    config = prefix.with_name("net_config.yml")
+    for kind, is_read in (
+        ("object:torch.nn.modules.activation.SiLU", True),
+        ("object:torch.nn.modules.activation.Tanh", False),
+        ("object/apply:os.system", False),
+    ):
+        text = re.sub(
+            r"base_fun_name: .*", f"base_fun_name: !!python/{kind}\n- touch x", config.read_text()
+        )
+        text = text.replace("\n- touch x\n- touch x", "\n- touch x")
+        config.write_text(text)
+        if is_read:
+            assert read_checkpoint(prefix).has_pruned_inputs
+        else:
+            assert "on every edge is not supported" in refusal(prefix)
+    assert not Path("x").exists()
+
+
 def test_inputs_that_were_not_scaled_are_refused(tmp_path):
     model = untrained((2, 1))
     model.update_grid(torch.rand(500, 2) * torch.tensor([1.0, 40.0]))
@@ -310,6 +426,8 @@ def test_command_scales_inputs_and_output_and_tests_on_a_recording(bms, tmp_path
         (["import-pykan", "{net}", "--out", "{tmp}/m.json", "--center", "1"], "--center"),
         (["import-pykan", "{net}", "--out", "{tmp}/m.json", "--half-range", "1,x"], "1,x"),
         (["import-pykan", "{net}", "--out", "{tmp}/m.json", "--half-range", "1,-1"], "half"),
+        (["import-pykan", "{net}", "--out", "{tmp}/m.json", "--input-id", "0"], "--input-id"),
+        (["import-pykan", "{net}", "--out", "{tmp}/m.json", "--input-id", "0,b"], "0,b"),
         (["import-pykan", "{net}", "--out", "{tmp}/m.json", "--preset", "nobody"], "nobody"),
         (["import-pykan", "{net}", "--out", "{tmp}/m.json", "--data", "x.csv"], "four inputs"),
         (

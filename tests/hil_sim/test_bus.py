@@ -76,7 +76,7 @@ def test_an_adapter_is_on_a_bus_with_others_and_a_socket_is_a_line_with_two_ends
     assert not is_serial_line("slcan:/dev/ttyACM0")
     assert ecu_remedy("slcan:/dev/ttyACM0") == "start 'bms ecu --bus slcan:/dev/ttyACM0'"
     for name in ("slcan:/dev/ttyACM0", "slcan:socket://127.0.0.1:5000"):
-        with pytest.raises(InputError, match=r"use .*'bms plant'"):
+        with pytest.raises(InputError, match=r"use .*'bms plant --bus BUS'"):
             require_room_for_ecu(name)
     require_room_for_ecu("socketcan:vcan0")
 

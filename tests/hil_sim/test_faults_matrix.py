@@ -15,6 +15,7 @@ from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
 from hil_sim.bus.database import load_codecs
 from hil_sim.fault_matrix.matrix import Expectation, fault_numbers, load_matrix, matrix_path
+from hil_sim.fault_matrix.report import MatrixResult, matrix_json, matrix_page
 from hil_sim.fault_matrix.runner import MatrixSettings, play, play_all
 from hil_sim.faults.frames import MessageFault
 from hil_sim.faults.plan import KINDS
@@ -191,6 +192,19 @@ def test_the_command_writes_table_page_json_and_junit(tmp_path):
     page = (tmp_path / "m" / "fault-matrix.html").read_text()
     assert "All 4 rows as expected" in page
     assert 'src="http' not in page and 'href="http' not in page
+
+
+def test_red_rows_come_first_and_the_others_keep_their_order():
+    good = play(SETTINGS, named("lost once: Coolant"))
+    red = replace(good, failures=("0 A too late",))
+    other = replace(good, row=named("lost twice: Coolant"))
+
+    result = MatrixResult(SETTINGS, [good, other, red], 1.0)
+
+    assert result.red_first == [red, good, other]
+    assert [row["passed"] for row in matrix_json(result)["results"]] == [False, True, True]
+    page = matrix_page(result)
+    assert page.index("0 A too late") < page.index("lost twice: Coolant")
 
 
 def test_a_red_row_is_exit_code_1_and_a_failure_in_junit(tmp_path):

@@ -215,7 +215,7 @@ def test_an_ecu_that_says_nothing_is_told_with_a_remedy(bms):
     with Line(lambda line: b"") as line:
         code, _, err = bms("plant", "--bus", line.bus, "--answer-timeout-s", "0.02")
     assert code == 2
-    assert "'make pil' starts one" in err
+    assert "'bms flash --image FILE --port PORT' starts one" in err
 
 
 @needs_emulator
