@@ -7,9 +7,9 @@ import io
 from collections.abc import Iterable
 from typing import Any
 
-from bms.cell import CellState
 from bms.presets import Preset
 from hil_sim.bus.catalog import FirstFault
+from hil_sim.plant.disturbances import knot_bounds
 from hil_sim.studies.campaign.draws import Draw, draw
 from hil_sim.studies.campaign.engine import (
     CONTROLLERS,
@@ -89,7 +89,7 @@ def run_one(scenario: Scenario, settings: CampaignSettings, run: int) -> Row:
     longest_s = settings.max_time_s + 60.0
     blocks = knot_blocks(
         drawn.disturbance,
-        preset.uncertainty,
+        knot_bounds(preset),
         drawn.disturbance_share,
         step_s,
         longest_s,
@@ -98,15 +98,9 @@ def run_one(scenario: Scenario, settings: CampaignSettings, run: int) -> Row:
     slope_K_per_s2 = drawn.disturbance_share * preset.uncertainty.surface_rate_K_per_s2
     first = blocks(1)
     limit_slope(first, 0.0, slope_K_per_s2 * step_s)
+    true_cell = drawn.true_cell(preset)
     charges = {
-        name: CampaignCharge(
-            scenario,
-            name,
-            drawn.cell,
-            CellState(drawn.soc, *[drawn.temperature_K] * 3),
-            drawn.cooling_power_W,
-            first[0],
-        )
+        name: CampaignCharge(scenario, name, true_cell, first[0], name == FIRMWARE)
         for name in CONTROLLERS
     }
     surface_before = float(first[0, 2])
@@ -142,7 +136,7 @@ def _row(preset: Preset, run: int, drawn: Draw, charges: dict[str, CampaignCharg
             "max_surface_temperature_K": peaks.surface_temperature_K,
             "max_voltage_V": peaks.voltage_V,
             "max_soc": peaks.soc,
-            "final_soc": charge.fields.state.soc,
+            "final_soc": charge.fields.memory.state.soc,
         }
         row |= {f"{prefix(name)}_{key}": value for key, value in values.items()}
     fields = charges[FIRMWARE].fields
