@@ -26,11 +26,12 @@ from hil_sim.run.workforce import (
     local_workforce,
 )
 from hil_sim.studies.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
+from hil_sim.studies.campaign.rows import header
 from hil_sim.studies.campaign.run import run_campaign
 from hil_sim.studies.campaign.settings import CHUNK_RUNS, CampaignSettings
 from hil_sim.studies.campaign.store import CampaignFolder
 from hil_sim.studies.campaign.summary import column, firmware_is_safe, summarise
-from hil_sim.studies.campaign.worker import header, run_chunk
+from hil_sim.studies.campaign.worker import run_chunk
 
 PRESET = "paper_calibrated"
 ALONE = Workforce(InlineExecutor(), 1)
@@ -54,7 +55,7 @@ def run_all(path, settings, workforce=ALONE, resume=False):
 @pytest.fixture(scope="module")
 def expected():
     settings = SHORT()
-    return (header() + run_chunk(settings, range(settings.runs))).encode()
+    return (header(settings.family) + run_chunk(settings, range(settings.runs))).encode()
 
 
 def test_processes_change_nothing(tmp_path, expected):

@@ -4,6 +4,7 @@ Its exact thermal step and the plant's Runge-Kutta differ by less than SAME_K.
 """
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from hil_sim.plant.true_cell import nominal_cell
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import ControllerKind, Settings
 from hil_sim.studies.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
+from hil_sim.studies.campaign.noise import streams
+from hil_sim.studies.campaign.real_draws import draw_real
 from hil_sim.studies.campaign.settings import CampaignSettings
 
 SEED = 5
@@ -36,7 +39,7 @@ def noise(preset, kind):
         yield sensors.standard_normal((BLOCK, 5)), knots
 
 
-def charge_in_c(preset, controller, kind, max_time_s):
+def charge_in_c(preset, controller, kind, max_time_s, true_cell=None):
     settings = CampaignSettings(
         preset, load_shipped_model(preset.name), runs=1, max_time_s=max_time_s
     )
@@ -44,7 +47,7 @@ def charge_in_c(preset, controller, kind, max_time_s):
     charge = CampaignCharge(
         Scenario(settings),
         controller.value,
-        nominal_cell(preset),
+        true_cell or nominal_cell(preset),
         next(numbers),
     )
     trace = []
@@ -110,3 +113,53 @@ def test_every_period_is_that_of_the_run_over_the_bus(name, controller, kind, ma
             summary.kan_max_abs_error_K, abs=half_a_step_K
         )
         assert fields.infeasible_periods == summary.infeasible_steps
+
+
+REAL_PRESET = load_preset("a123_26650_10C")
+
+
+@pytest.mark.parametrize("run", [0, 1, 2])
+@pytest.mark.parametrize("controller", [ControllerKind.KAN_RCBF, ControllerKind.CC_CV])
+def test_a_cell_of_the_family_charges_as_over_the_bus(run, controller):
+    """With its tables, branches, wrong plug-in state, lag and tolerance of the charger, biases."""
+    kind = DisturbanceKind.GAUSSIAN
+    sensors = replace(
+        REAL_PRESET.sensors, voltage_V=replace(REAL_PRESET.sensors.voltage_V, bias=0.002)
+    )
+    preset = replace(
+        REAL_PRESET,
+        sensors=sensors,
+        uncertainty=replace(REAL_PRESET.uncertainty, core_K_per_As=1e-4),
+    )
+    true_cell = draw_real(preset, 10_800.0, streams(SEED, run).draw).cell
+    charge, trace = charge_in_c(preset, controller, kind, 60.0, true_cell)
+    settings = Settings(
+        preset,
+        controller=controller,
+        seed=SEED,
+        disturbance=kind,
+        max_time_s=60.0,
+        true_cell=true_cell,
+    )
+    result = run_both(settings)
+    print(
+        "REAL",
+        [
+            np.abs(np.array(a) - b).max()
+            for a, b in zip(
+                np.transpose(trace),
+                [
+                    result.series.soc,
+                    result.series.core_temperature_K,
+                    result.series.surface_temperature_K,
+                    result.series.coolant_temperature_K,
+                    result.series.current_A,
+                ],
+            )
+        ],
+        result.summary.stop_reason,
+        charge.fields.peaks.voltage_V - result.summary.max_voltage_V,
+        min(result.series.current_A),
+        np.unique(result.series.state),
+    )
+    assert 0

@@ -65,7 +65,7 @@ def _thermal_step(cell: CellParameters, step_s: float) -> dict[str, Any]:
     With dx/dt = A x + w and w linear from w0 to w1: x1 - x0 = (e^(Ah) - 1) x0 + G0 w0 + G1 w1. The
     rows of A add up to 0, so that the first term takes differences of temperatures only.
     """
-    rate_per_s = _thermal_matrix(cell)
+    rate_per_s = thermal_matrix_per_s(cell)
     one, zero = np.eye(3), np.zeros((3, 3))
     block = np.block(
         [
@@ -87,7 +87,7 @@ def _thermal_step(cell: CellParameters, step_s: float) -> dict[str, Any]:
     }
 
 
-def _thermal_matrix(cell: CellParameters) -> Array:
+def thermal_matrix_per_s(cell: CellParameters) -> Array:
     """Rates (1/s) of core, surface and coolant temperature by conduction alone, (3, 3)."""
     core_W_per_K = 1.0 / cell.core_resistance_K_per_W
     coolant_W_per_K = 1.0 / cell.surface_resistance_K_per_W
