@@ -142,24 +142,18 @@ def test_a_cell_of_the_family_charges_as_over_the_bus(run, controller):
         true_cell=true_cell,
     )
     result = run_both(settings)
-    print(
-        "REAL",
-        [
-            np.abs(np.array(a) - b).max()
-            for a, b in zip(
-                np.transpose(trace),
-                [
-                    result.series.soc,
-                    result.series.core_temperature_K,
-                    result.series.surface_temperature_K,
-                    result.series.coolant_temperature_K,
-                    result.series.current_A,
-                ],
-            )
-        ],
-        result.summary.stop_reason,
-        charge.fields.peaks.voltage_V - result.summary.max_voltage_V,
-        min(result.series.current_A),
-        np.unique(result.series.state),
-    )
-    assert 0
+    summary, series, peaks = result.summary, result.series, charge.fields.peaks
+    soc, core_K, surface_K, coolant_K, currents_A = np.transpose(trace)
+    assert currents_A.tolist() == series.current_A
+    assert min(currents_A) < -5.0
+    assert soc.tolist() == series.soc
+    assert (charge.outcome, peaks.soc) == (summary.stop_reason, summary.max_soc)
+    for ours_K, theirs_K in (
+        (core_K, series.core_temperature_K),
+        (surface_K, series.surface_temperature_K),
+        (coolant_K, series.coolant_temperature_K),
+        ([peaks.core_temperature_K], [summary.max_core_temperature_K]),
+        ([peaks.surface_temperature_K], [summary.max_surface_temperature_K]),
+    ):
+        assert np.abs(np.subtract(ours_K, theirs_K)).max() < 1e-7
+    assert peaks.voltage_V == pytest.approx(summary.max_voltage_V, abs=1e-9)

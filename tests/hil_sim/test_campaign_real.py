@@ -13,10 +13,6 @@ from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset
 from hil_sim.commands import campaign as command
 from hil_sim.plant.disturbances import DisturbanceKind
-from hil_sim.plant.true_cell import nominal_cell
-from hil_sim.run.session import run_both
-from hil_sim.run.settings import ControllerKind, Settings
-from hil_sim.studies.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
 from hil_sim.studies.campaign.noise import streams
 from hil_sim.studies.campaign.real_draws import draw_real
 from hil_sim.studies.campaign.real_summary import family_is_safe, summarise_family
