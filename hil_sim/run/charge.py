@@ -65,9 +65,7 @@ class Charge:
         self.first_fault: int | None = None
         self._edge: int | None = None
         self._silent_periods = 0
-        self._plug_in_soc = (
-            self.plant.state.soc if self.plug_in_soc is None else self.plug_in_soc
-        )
+        self._plug_in_soc = self.plant.state.soc if self.plug_in_soc is None else self.plug_in_soc
 
     def run(self) -> str:
         """Run to the end and return why it ended.

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -15,7 +16,9 @@ from bms.cell import CellState, rates
 from bms.errors import InputError
 from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset
+from bms.presets.schema import Initial
 from hil_sim.commands import campaign as command
+from hil_sim.plant.true_cell import nominal_cell
 from hil_sim.run.workforce import (
     InlineExecutor,
     Workforce,
@@ -23,11 +26,12 @@ from hil_sim.run.workforce import (
     local_workforce,
 )
 from hil_sim.studies.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
+from hil_sim.studies.campaign.rows import header
 from hil_sim.studies.campaign.run import run_campaign
 from hil_sim.studies.campaign.settings import CHUNK_RUNS, CampaignSettings
 from hil_sim.studies.campaign.store import CampaignFolder
 from hil_sim.studies.campaign.summary import column, firmware_is_safe, summarise
-from hil_sim.studies.campaign.worker import header, run_chunk
+from hil_sim.studies.campaign.worker import run_chunk
 
 PRESET = "paper_calibrated"
 ALONE = Workforce(InlineExecutor(), 1)
@@ -51,7 +55,7 @@ def run_all(path, settings, workforce=ALONE, resume=False):
 @pytest.fixture(scope="module")
 def expected():
     settings = SHORT()
-    return (header() + run_chunk(settings, range(settings.runs))).encode()
+    return (header(settings.family) + run_chunk(settings, range(settings.runs))).encode()
 
 
 def test_processes_change_nothing(tmp_path, expected):
@@ -196,13 +200,14 @@ def test_the_model_error_is_that_of_the_cell_model(tmp_path):
         **vars(preset.cell)
         | {"core_heat_capacity_J_per_K": 1.05 * preset.cell.core_heat_capacity_J_per_K}
     )
-    start = CellState(0.1, 300.0, 300.0, 300.0)
-    charge = CampaignCharge(Scenario(settings), "kan-rcbf", cell, start, 0.5, np.zeros(4))
+    start = nominal_cell(preset, Initial(0.1, 300.0, 0.5))
+    other = replace(start, cell=cell)
+    charge = CampaignCharge(Scenario(settings), "kan-rcbf", other, np.zeros(4), True)
     worst = np.zeros(4)
     periods = 600
     for _ in range(periods):
         charge.advance(np.zeros((1, 5)), np.zeros((SUB_STEPS, 4)))
-        now = charge.fields.state
+        now = charge.fields.memory.state
         state = CellState(now.soc, now.core, now.surface, now.coolant)
         true, nominal = (
             np.array(rates(some, state, charge.fields.current_A, 0.5))

@@ -1,22 +1,29 @@
-"""A charge of the campaign's C runner is the charge that runs over the bus, bit by bit."""
+"""A charge of the campaign's C runner is the charge that runs over the bus, current by current.
+
+Its exact thermal step and the plant's Runge-Kutta differ by less than SAME_K.
+"""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from bms.cell import CellState
 from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset
 from hil_sim.plant.disturbances import DisturbanceKind, disturbance_source
+from hil_sim.plant.true_cell import nominal_cell
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import ControllerKind, Settings
 from hil_sim.studies.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
+from hil_sim.studies.campaign.noise import streams
+from hil_sim.studies.campaign.real_draws import draw_real
 from hil_sim.studies.campaign.settings import CampaignSettings
 
 SEED = 5
 BLOCK = 500
 FULL_S = 3600.0
+SAME_K = 2e-9
 
 
 def noise(preset, kind):
@@ -32,12 +39,7 @@ def noise(preset, kind):
         yield sensors.standard_normal((BLOCK, 5)), knots
 
 
-def start_of(preset):
-    start = preset.initial
-    return CellState(start.soc, *[start.temperature_K] * 3)
-
-
-def charge_in_c(preset, controller, kind, max_time_s):
+def charge_in_c(preset, controller, kind, max_time_s, true_cell=None):
     settings = CampaignSettings(
         preset, load_shipped_model(preset.name), runs=1, max_time_s=max_time_s
     )
@@ -45,15 +47,13 @@ def charge_in_c(preset, controller, kind, max_time_s):
     charge = CampaignCharge(
         Scenario(settings),
         controller.value,
-        preset.cell,
-        start_of(preset),
-        preset.initial.cooling_power_W,
+        true_cell or nominal_cell(preset),
         next(numbers),
     )
     trace = []
     for normals, knots in numbers:
         for i in range(BLOCK):
-            state = charge.fields.state
+            state = charge.fields.memory.state
             trace.append((state.soc, state.core, state.surface, state.coolant))
             charge.advance(normals[i : i + 1], knots[i * SUB_STEPS : (i + 1) * SUB_STEPS])
             trace[-1] += (charge.fields.current_A,)
@@ -86,18 +86,23 @@ def test_every_period_is_that_of_the_run_over_the_bus(name, controller, kind, ma
         )
     )
     summary, series, fields = result.summary, result.series, charge.fields
-    assert trace == list(
-        zip(
-            series.soc,
-            series.core_temperature_K,
-            series.surface_temperature_K,
-            series.coolant_temperature_K,
-            series.current_A,
-        )
-    )
+    *states, currents_A = np.transpose(trace)
+    over_the_bus = [
+        series.soc,
+        series.core_temperature_K,
+        series.surface_temperature_K,
+        series.coolant_temperature_K,
+    ]
+    assert states[0].tolist() == series.soc
+    for ours_K, theirs_K in zip(states[1:], over_the_bus[1:]):
+        assert np.abs(ours_K - theirs_K).max() < SAME_K
+    assert currents_A.tolist() == series.current_A
     assert (charge.outcome, fields.periods) == (summary.stop_reason, summary.steps)
-    assert fields.peaks.core_temperature_K == summary.max_core_temperature_K
-    assert fields.peaks.surface_temperature_K == summary.max_surface_temperature_K
+    for peak_K, of_bus_K in (
+        (fields.peaks.core_temperature_K, summary.max_core_temperature_K),
+        (fields.peaks.surface_temperature_K, summary.max_surface_temperature_K),
+    ):
+        assert peak_K == pytest.approx(of_bus_K, abs=SAME_K, rel=0.0)
     assert fields.peaks.voltage_V == summary.max_voltage_V
     assert fields.peaks.soc == summary.max_soc
     assert fields.time_s == pytest.approx(series.time_s[-1])
@@ -108,3 +113,47 @@ def test_every_period_is_that_of_the_run_over_the_bus(name, controller, kind, ma
             summary.kan_max_abs_error_K, abs=half_a_step_K
         )
         assert fields.infeasible_periods == summary.infeasible_steps
+
+
+REAL_PRESET = load_preset("a123_26650_10C")
+
+
+@pytest.mark.parametrize("run", [0, 1, 2])
+@pytest.mark.parametrize("controller", [ControllerKind.KAN_RCBF, ControllerKind.CC_CV])
+def test_a_cell_of_the_family_charges_as_over_the_bus(run, controller):
+    """With its tables, branches, wrong plug-in state, lag and tolerance of the charger, biases."""
+    kind = DisturbanceKind.GAUSSIAN
+    sensors = replace(
+        REAL_PRESET.sensors, voltage_V=replace(REAL_PRESET.sensors.voltage_V, bias=0.002)
+    )
+    preset = replace(
+        REAL_PRESET,
+        sensors=sensors,
+        uncertainty=replace(REAL_PRESET.uncertainty, core_K_per_As=1e-4),
+    )
+    true_cell = draw_real(preset, 10_800.0, streams(SEED, run).draw).cell
+    charge, trace = charge_in_c(preset, controller, kind, 60.0, true_cell)
+    settings = Settings(
+        preset,
+        controller=controller,
+        seed=SEED,
+        disturbance=kind,
+        max_time_s=60.0,
+        true_cell=true_cell,
+    )
+    result = run_both(settings)
+    summary, series, peaks = result.summary, result.series, charge.fields.peaks
+    soc, core_K, surface_K, coolant_K, currents_A = np.transpose(trace)
+    assert currents_A.tolist() == series.current_A
+    assert min(currents_A) < -5.0
+    assert soc.tolist() == series.soc
+    assert (charge.outcome, peaks.soc) == (summary.stop_reason, summary.max_soc)
+    for ours_K, theirs_K in (
+        (core_K, series.core_temperature_K),
+        (surface_K, series.surface_temperature_K),
+        (coolant_K, series.coolant_temperature_K),
+        ([peaks.core_temperature_K], [summary.max_core_temperature_K]),
+        ([peaks.surface_temperature_K], [summary.max_surface_temperature_K]),
+    ):
+        assert np.abs(np.subtract(ours_K, theirs_K)).max() < 1e-7
+    assert peaks.voltage_V == pytest.approx(summary.max_voltage_V, abs=1e-9)

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import kstest, pearsonr
 
 from bms.presets import load_preset
-from hil_sim.plant.disturbances import DisturbanceKind
+from hil_sim.plant.disturbances import DisturbanceKind, knot_bounds
 from hil_sim.studies.campaign.draws import Family, draw
 from hil_sim.studies.campaign.engine import limit_slope
 from hil_sim.studies.campaign.noise import knot_blocks, streams
@@ -85,7 +85,9 @@ def test_a_run_is_the_same_whatever_ran_before():
 )
 def test_disturbances_use_their_share_of_the_bounds_and_no_more(kind, any_preset):
     bounds, share = any_preset.uncertainty, 0.25
-    blocks = knot_blocks(kind, bounds, share, STEP_S, 600.0, np.random.default_rng(2))
+    blocks = knot_blocks(
+        kind, knot_bounds(any_preset), share, STEP_S, 600.0, np.random.default_rng(2)
+    )
     knots = np.concatenate([blocks(1000) for _ in range(60)])
     largest = np.abs(knots).max(axis=0)
     expected = [bounds.soc_per_s, bounds.core_K_per_s, bounds.surface_K_per_s]
@@ -100,7 +102,7 @@ def test_blocks_of_bang_bang_join_without_a_seam(any_preset):
     def source():
         return knot_blocks(
             DisturbanceKind.BANG_BANG,
-            any_preset.uncertainty,
+            knot_bounds(any_preset),
             1.0,
             STEP_S,
             60.0,

@@ -11,9 +11,11 @@ import numpy as np
 
 from bms.arrays import Array
 from bms.barrier.rates import heat_range_W
-from bms.cell import CellParameters
+from bms.cell import CellFactors, CellParameters, scaled
 from bms.presets import Preset
+from bms.presets.schema import Initial
 from hil_sim.plant.disturbances import DisturbanceKind
+from hil_sim.plant.true_cell import TrueCell, nominal_cell
 
 
 class RelativeInterval(NamedTuple):
@@ -60,6 +62,12 @@ class Draw:
     disturbance: DisturbanceKind
     disturbance_share: float
 
+    def true_cell(self, preset: Preset) -> TrueCell:
+        """The cell in equilibrium, with the preset's sensors and an ideal charger."""
+        start = Initial(self.soc, self.temperature_K, max(self.cooling_power_W, 0.0))
+        nominal = nominal_cell(preset, start)
+        return replace(nominal, cell=self.cell, cooling_power_W=self.cooling_power_W)
+
 
 def draw(preset: Preset, run: int, rng: np.random.Generator) -> Draw:
     """Draw of a run; every quantity is uniform in its interval. Families alternate."""
@@ -90,11 +98,13 @@ def draw(preset: Preset, run: int, rng: np.random.Generator) -> Draw:
 
 def _scaled(cell: CellParameters, factors: Array) -> CellParameters:
     core_resistance, core_heat_capacity, surface_resistance = map(float, factors)
-    return replace(
+    return scaled(
         cell,
-        core_resistance_K_per_W=cell.core_resistance_K_per_W * core_resistance,
-        core_heat_capacity_J_per_K=cell.core_heat_capacity_J_per_K * core_heat_capacity,
-        surface_resistance_K_per_W=cell.surface_resistance_K_per_W * surface_resistance,
+        CellFactors(
+            core_resistance=core_resistance,
+            core_heat_capacity=core_heat_capacity,
+            surface_resistance=surface_resistance,
+        ),
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,13 +11,15 @@ from bms.barrier import barrier_constants
 from bms.baselines.cc_cv import CUT_BACK_SPAN_K
 from bms.baselines.measured_cell import charging_voltage_V
 from bms.calibration import calibration_fields
-from bms.cell import CellParameters, CellState
 from bms.presets import Preset
 from bms.presets.schema import Sensor
 from codegen.can_database import load_database
+from hil_sim.plant.charger import lag_share
 from hil_sim.plant.sensors import Readings
+from hil_sim.plant.true_cell import TrueCell
 from hil_sim.run.charge import OFF_PERIODS, READY_PERIODS, STARTING_PERIODS
 from hil_sim.studies.campaign._runner import ffi, lib
+from hil_sim.studies.campaign.native_cell import cell_fields
 from hil_sim.studies.campaign.settings import CampaignSettings
 
 SUB_STEPS: int = lib.CHARGE_SUB_STEPS
@@ -61,8 +62,9 @@ class Scenario:
                 "off_periods": OFF_PERIODS,
                 "ready_periods": READY_PERIODS,
                 "starting_periods": STARTING_PERIODS,
-                "nominal": _cell(preset.cell),
-                "sensors": [asdict(getattr(preset.sensors, name)) for name in Readings._fields],
+                "nominal": cell_fields(preset.cell, preset.timing.sampling_period_s / SUB_STEPS),
+                "sensors": [_sensor(getattr(preset.sensors, name)) for name in Readings._fields],
+                "core_bound": _core_bound(preset),
                 "signals": _signals(),
                 "baselines": _baselines(preset),
             },
@@ -76,21 +78,29 @@ class CampaignCharge:
         self,
         scenario: Scenario,
         controller: str,
-        cell: CellParameters,
-        state: CellState,
-        cooling_power_W: float,
+        true_cell: TrueCell,
         first_knot: Array,
+        watches_model_error: bool = False,
     ) -> None:
         """The first knot is the disturbance at the beginning, (4,)."""
         self._scenario = scenario
+        period_s = scenario.preset.timing.sampling_period_s
         self.fields: Any = ffi.new(
             "charge_t *",
             {
                 "scenario": scenario.fields,
                 "controller": CONTROLLERS[controller],
-                "cell": _cell(cell),
-                "cooling_power_W": cooling_power_W,
-                "state": tuple(state),
+                "cell": cell_fields(true_cell.cell, period_s / SUB_STEPS),
+                "cooling_power_W": true_cell.cooling_power_W,
+                "plug_in_soc": true_cell.plug_in_soc,
+                "bias": tuple(true_cell.biases),
+                "supply_gain": 1.0 + true_cell.supply_tolerance,
+                "supply_share": lag_share(period_s, true_cell.supply_lag_s),
+                "watches_model_error": watches_model_error,
+                "memory": {
+                    "state": tuple(true_cell.state),
+                    "polarisation_V": tuple(true_cell.polarisation_V),
+                },
                 "knot": tuple(map(float, first_knot)),
             },
         )
@@ -123,26 +133,22 @@ def limit_slope(knots: Array, before: float, largest_change: float) -> None:
     )
 
 
+def _sensor(sensor: Sensor) -> dict[str, float]:
+    return {"resolution": sensor.resolution, "noise_std": sensor.noise_std}
+
+
+def _core_bound(preset: Preset) -> dict[str, float]:
+    bounds = preset.uncertainty
+    return {
+        "constant_K_per_s": bounds.core_K_per_s,
+        "per_A_K_per_As": bounds.core_K_per_As,
+        "per_A2_K_per_A2s": bounds.core_K_per_A2s,
+        "at_reference_K_per_s": bounds.core_at_K_per_s(preset.limits.reference_current_A),
+    }
+
+
 def _doubles(values: Array) -> Any:
     return ffi.from_buffer("double[]", np.ascontiguousarray(values, dtype=np.float64))
-
-
-def _cell(cell: CellParameters) -> dict[str, Any]:
-    names = (
-        "capacity_As",
-        "core_resistance_K_per_W",
-        "core_heat_capacity_J_per_K",
-        "surface_resistance_K_per_W",
-        "surface_heat_capacity_J_per_K",
-        "coolant_heat_capacity_J_per_K",
-        "ohmic_resistance_ohm",
-        "entropic_coefficient_V_per_K",
-    )
-    return {name: getattr(cell, name) for name in names} | {
-        "ocv_points": len(cell.ocv.soc),
-        "ocv_soc": cell.ocv.soc,
-        "ocv_V": cell.ocv.voltage_V,
-    }
 
 
 def _signals() -> dict[str, Any]:

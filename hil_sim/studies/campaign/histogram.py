@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from bms.arrays import Array
+from bms.arrays import Array, Mask
 from hil_sim.report.chart import CONTROLLER_COLOURS, LIMIT_COLOUR
 from hil_sim.studies.campaign.engine import CONTROLLERS
-from hil_sim.studies.campaign.settings import CampaignSettings
-from hil_sim.studies.campaign.summary import CLASSES, Rows, column, limits
-from hil_sim.studies.campaign.worker import prefix
+from hil_sim.studies.campaign.rows import prefix
+from hil_sim.studies.campaign.settings import CampaignSettings, CellFamily
+from hil_sim.studies.campaign.summary import Rows, column, limits
 
 _BINS = 60
 _TITLES = {
@@ -23,18 +23,17 @@ _TITLES = {
 
 
 def save_histograms(settings: CampaignSettings, rows: Rows, path: Path) -> None:
-    """Write a PNG with one row of panels for each class of cells."""
+    """Write a PNG with one row of panels for each class of cells; a family is one class."""
     allowed = limits(settings)
     panels = (
         ("max_core_temperature_K", "peak core temperature in K", allowed["core"][1]),
         ("max_surface_temperature_K", "peak surface temperature in K", allowed["surface"][1]),
         ("charge_time_s", "charging time in s", None),
     )
-    inside = column(rows, "inside") == 1.0
-    figure = Figure(figsize=(13, 7), layout="constrained")
-    axes = figure.subplots(len(CLASSES), len(panels))
-    for line, name in zip(axes, CLASSES):
-        mask = inside if name == "inside" else ~inside
+    classes = _classes(settings, rows)
+    figure = Figure(figsize=(13, 3.5 * len(classes)), layout="constrained")
+    axes = figure.subplots(len(classes), len(panels), squeeze=False)
+    for line, (title, mask) in zip(axes, classes.items()):
         for axis, (quantity, label, limit) in zip(line, panels):
             values = {
                 controller: column(rows, f"{prefix(controller)}_{quantity}")[mask]
@@ -51,10 +50,18 @@ def save_histograms(settings: CampaignSettings, rows: Rows, path: Path) -> None:
             axis.set_xlabel(label)
             axis.set_ylabel("runs")
             axis.set_yscale("symlog")
-            axis.set_title(f"{_TITLES[name]} ({int(mask.sum())} runs)", fontsize=9)
+            axis.set_title(f"{title} ({int(mask.sum())} runs)", fontsize=9)
     axes[0][0].legend()
     figure.suptitle(f"{settings.preset.name}, {settings.runs} runs, seed {settings.seed}")
     figure.savefig(path, dpi=110, metadata={"Software": None})
+
+
+def _classes(settings: CampaignSettings, rows: Rows) -> dict[str, Mask]:
+    """Title of each class, and which rows are of it."""
+    if settings.family is CellFamily.REAL:
+        return {"cells of the preset's family": np.ones(len(rows), dtype=bool)}
+    inside = column(rows, "inside") == 1.0
+    return {_TITLES["inside"]: inside, _TITLES["outside"]: ~inside}
 
 
 def _edges(values: Array, limit: float | None) -> Array:

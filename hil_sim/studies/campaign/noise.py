@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bms.arrays import Array
-from bms.presets.schema import Uncertainty
+from bms.cell import Disturbance
 from hil_sim.plant.disturbances import LONGEST_DWELL_S, SHORTEST_DWELL_S, DisturbanceKind
 
 _CHANNELS = 4
@@ -36,16 +36,14 @@ KnotBlocks = Callable[[int], Array]
 
 def knot_blocks(
     kind: DisturbanceKind,
-    bounds: Uncertainty,
+    bounds: Disturbance,
     share: float,
     step_s: float,
     longest_s: float,
     rng: np.random.Generator,
 ) -> KnotBlocks:
     """Disturbances of hil_sim.plant.disturbances at a share of the bounds, without slope limit."""
-    amplitude = share * np.array(
-        [bounds.soc_per_s, bounds.core_K_per_s, bounds.surface_K_per_s, bounds.coolant_K_per_s]
-    )
+    amplitude = share * np.array(bounds)
     if kind is DisturbanceKind.GAUSSIAN:
         return lambda count: amplitude * np.clip(rng.standard_normal((count, _CHANNELS)), -1.0, 1.0)
     if kind is DisturbanceKind.BANG_BANG:

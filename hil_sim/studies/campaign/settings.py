@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any
 
 from bms.errors import InputError
@@ -16,11 +17,24 @@ CHUNK_RUNS = 20
 """Runs that a worker does in one piece and that are stored together; about a second of work."""
 
 
+class CellFamily(str, Enum):
+    """Which cells are drawn, by the name on the command line."""
+
+    PUBLISHED = "published"
+    """In the published intervals of core and surface, in equilibrium, known state of charge."""
+    REAL = "real"
+    """All that the preset's intervals, plug-in errors, supply and disturbance admit."""
+
+
+MAX_TIME_S = {CellFamily.PUBLISHED: 3600.0, CellFamily.REAL: 10_800.0}
+"""Time limit of a charge unless another is given; cold cells are charged slowly."""
+
+
 @dataclass(frozen=True)
 class CampaignSettings:
     """A campaign. `firmware_changes` sets constants of the firmware to other values, for studies.
 
-    Raises InputError when there is nothing to run.
+    Raises InputError when there is nothing to run, or no family to draw from.
     """
 
     preset: Preset
@@ -29,10 +43,16 @@ class CampaignSettings:
     seed: int = 0
     max_time_s: float = 3600.0
     firmware_changes: Mapping[str, float] = field(default_factory=dict)
+    family: CellFamily = CellFamily.PUBLISHED
 
     def __post_init__(self) -> None:
         if self.runs < 1:
             raise InputError(f"campaign of {self.runs} runs: at least 1 is needed")
+        if self.family is CellFamily.REAL and self.preset.cell.interval is None:
+            raise InputError(
+                f"preset '{self.preset.name}': has no [cell.interval], so there is no family to "
+                "draw from; leave out --family real or choose a preset with one"
+            )
 
     def identity(self) -> dict[str, Any]:
         """Everything that the results depend on, as plain JSON; stored beside them."""
@@ -44,6 +64,7 @@ class CampaignSettings:
             "seed": self.seed,
             "max_time_s": self.max_time_s,
             "firmware_changes": dict(self.firmware_changes),
+            "family": self.family.value,
         }
 
     @property

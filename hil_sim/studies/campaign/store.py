@@ -11,8 +11,8 @@ from typing import Any
 
 from bms.errors import InputError
 from bms.validation import read_json
+from hil_sim.studies.campaign.rows import header
 from hil_sim.studies.campaign.settings import CampaignSettings
-from hil_sim.studies.campaign.worker import header
 
 
 class CampaignFolder:
@@ -54,7 +54,9 @@ class CampaignFolder:
         """Join the pieces, in the order of their runs, to runs.csv."""
         if not self._runs_path.exists():
             pieces = map(self._chunk_path, self._settings.chunks())
-            text = header() + "".join(piece.read_text(encoding="utf-8") for piece in pieces)
+            text = header(self._settings.family) + "".join(
+                piece.read_text(encoding="utf-8") for piece in pieces
+            )
             self._write(self._runs_path, text)
         shutil.rmtree(self._chunks, ignore_errors=True)
 

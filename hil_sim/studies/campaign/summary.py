@@ -10,8 +10,8 @@ from scipy.stats import binomtest
 
 from bms.arrays import Array, Mask
 from hil_sim.studies.campaign.engine import CONTROLLERS
+from hil_sim.studies.campaign.rows import FIRMWARE, prefix
 from hil_sim.studies.campaign.settings import CampaignSettings
-from hil_sim.studies.campaign.worker import FIRMWARE, prefix
 
 CONFIDENCE = 0.95
 CLASSES = ("inside", "outside")
@@ -85,15 +85,15 @@ def _figures(settings: CampaignSettings, rows: Rows, mask: Mask, controller: str
     peaks = {peak: f"{name}_{peak}" for peak, _ in limits(settings).values()}
     return {
         "violations": {
-            limit: _probability(int(hits.sum()), runs) for limit, hits in crossed.items()
+            limit: probability(int(hits.sum()), runs) for limit, hits in crossed.items()
         },
         "outcomes": dict(sorted(outcomes.items())),
-        "peaks": {peak: _quantiles(column(rows, of)[mask]) for peak, of in peaks.items()},
-        "charge_time_s": _quantiles(column(rows, f"{name}_charge_time_s")[mask]),
+        "peaks": {peak: quantiles(column(rows, of)[mask]) for peak, of in peaks.items()},
+        "charge_time_s": quantiles(column(rows, f"{name}_charge_time_s")[mask]),
     }
 
 
-def _probability(count: int, runs: int) -> dict[str, float | int | None]:
+def probability(count: int, runs: int) -> dict[str, float | int | None]:
     """Share with its two-sided Clopper-Pearson interval; nothing is known from no run."""
     if runs == 0:
         return {"count": 0, "probability": None, "low": None, "high": None}
@@ -106,7 +106,8 @@ def _probability(count: int, runs: int) -> dict[str, float | int | None]:
     }
 
 
-def _quantiles(values: Array) -> dict[str, float] | None:
+def quantiles(values: Array) -> dict[str, float] | None:
+    """Least, greatest and three quantiles of the numbers that are known; None without any."""
     known = values[~np.isnan(values)]
     if known.size == 0:
         return None

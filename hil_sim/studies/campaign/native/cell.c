@@ -1,87 +1,156 @@
 #include "cell.h"
 
-static cell_state_t moved(const cell_state_t *state, const cell_state_t *rate, double step_s)
+/* Index of the point below, so that one above exists; needs two points and a value on the axis. */
+static uint32_t point_below(const double *axis, uint32_t points, double at)
 {
-    const cell_state_t next = {
-        state->soc + step_s * rate->soc,
-        state->core + step_s * rate->core,
-        state->surface + step_s * rate->surface,
-        state->coolant + step_s * rate->coolant,
-    };
-    return next;
+    uint32_t low = 0u;
+    uint32_t high = points - 1u;
+    while (high - low > 1u) {
+        const uint32_t middle = (low + high) / 2u;
+        if (at >= axis[middle]) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
 }
 
-static double mean_rate(double a, double b, double c, double d)
+/* As numpy.interp. */
+static double curve_at(const cell_curve_t *curve, double at)
 {
-    return (a + 2.0 * (b + c) + d) / 6.0;
+    const uint32_t last = curve->points - 1u;
+    if (at <= curve->axis[0]) {
+        return curve->value[0];
+    }
+    if (at >= curve->axis[last]) {
+        return curve->value[last];
+    }
+    const uint32_t i = point_below(curve->axis, curve->points, at);
+    const double slope =
+        (curve->value[i + 1u] - curve->value[i]) / (curve->axis[i + 1u] - curve->axis[i]);
+    return slope * (at - curve->axis[i]) + curve->value[i];
 }
 
-cell_state_t cell_rates(const cell_t *cell, const cell_state_t *state, double current_A,
-                        double cooling_power_W, const cell_state_t *disturbance)
+typedef struct {
+    uint32_t below;
+    uint32_t above;
+    double share;
+} position_t;
+
+static position_t position_of(const double *axis, uint32_t points, double at)
 {
-    const double core_to_surface_W =
-        (state->core - state->surface) / cell->core_resistance_K_per_W;
-    const double surface_to_coolant_W =
-        (state->surface - state->coolant) / cell->surface_resistance_K_per_W;
-    const double heat_W = (cell->ohmic_resistance_ohm * current_A -
-                           cell->entropic_coefficient_V_per_K * state->core) *
-                          current_A;
-    const cell_state_t rates = {
-        disturbance->soc - current_A / cell->capacity_As,
-        disturbance->core + (heat_W - core_to_surface_W) / cell->core_heat_capacity_J_per_K,
-        disturbance->surface +
-            (core_to_surface_W - surface_to_coolant_W) / cell->surface_heat_capacity_J_per_K,
-        disturbance->coolant +
-            (surface_to_coolant_W - cooling_power_W) / cell->coolant_heat_capacity_J_per_K,
-    };
-    return rates;
+    const uint32_t last = points - 1u;
+    if ((last == 0u) || (at <= axis[0])) {
+        return (position_t){ 0u, 0u, 0.0 };
+    }
+    if (at >= axis[last]) {
+        return (position_t){ last, last, 0.0 };
+    }
+    const uint32_t i = point_below(axis, points, at);
+    return (position_t){ i, i + 1u, (at - axis[i]) / (axis[i + 1u] - axis[i]) };
 }
 
-cell_state_t cell_step(const cell_t *cell, const cell_state_t *state, double current_A,
-                       double cooling_power_W, double step_s, const cell_state_t *first_rates,
-                       const cell_state_t *before, const cell_state_t *after)
+static double resistance_ohm(const cell_t *cell, double core_K, double soc)
 {
-    const cell_state_t middle = {
-        0.5 * (before->soc + after->soc),
-        0.5 * (before->core + after->core),
-        0.5 * (before->surface + after->surface),
-        0.5 * (before->coolant + after->coolant),
-    };
-    const cell_state_t *k1 = first_rates;
-    const cell_state_t at2 = moved(state, k1, 0.5 * step_s);
-    const cell_state_t k2 = cell_rates(cell, &at2, current_A, cooling_power_W, &middle);
-    const cell_state_t at3 = moved(state, &k2, 0.5 * step_s);
-    const cell_state_t k3 = cell_rates(cell, &at3, current_A, cooling_power_W, &middle);
-    const cell_state_t at4 = moved(state, &k3, step_s);
-    const cell_state_t k4 = cell_rates(cell, &at4, current_A, cooling_power_W, after);
-    const cell_state_t mean = {
-        mean_rate(k1->soc, k2.soc, k3.soc, k4.soc),
-        mean_rate(k1->core, k2.core, k3.core, k4.core),
-        mean_rate(k1->surface, k2.surface, k3.surface, k4.surface),
-        mean_rate(k1->coolant, k2.coolant, k3.coolant, k4.coolant),
-    };
-    return moved(state, &mean, step_s);
+    const cell_resistance_t *table = &cell->resistance;
+    if (table->rows == 0u) {
+        return cell->ohmic_resistance_ohm;
+    }
+    const position_t s = position_of(table->soc, table->columns, soc);
+    const position_t t = position_of(table->temperature_K, table->rows, core_K);
+    const double *colder = &table->ohm[t.below * table->columns];
+    const double *warmer = &table->ohm[t.above * table->columns];
+    const double cold = colder[s.below] * (1.0 - s.share) + colder[s.above] * s.share;
+    const double warm = warmer[s.below] * (1.0 - s.share) + warmer[s.above] * s.share;
+    return cold * (1.0 - t.share) + warm * t.share;
+}
+
+static double entropic_V_per_K(const cell_t *cell, double soc)
+{
+    return (cell->entropy_V_per_K.points == 0u) ? cell->entropic_coefficient_V_per_K
+                                                : curve_at(&cell->entropy_V_per_K, soc);
+}
+
+static double heat_W(const cell_t *cell, double core_K, double soc, double current_A)
+{
+    return (resistance_ohm(cell, core_K, soc) * current_A - entropic_V_per_K(cell, soc) * core_K) *
+           current_A;
+}
+
+double cell_heat_W(const cell_t *cell, const cell_state_t *state, double current_A)
+{
+    return heat_W(cell, state->core, state->soc, current_A);
+}
+
+double cell_polarisation_heat_W(const cell_t *cell, const double *polarisation_V)
+{
+    double sum_W = 0.0;
+    for (uint32_t i = 0u; i < cell->branches; i++) {
+        sum_W += polarisation_V[i] * polarisation_V[i] / cell->branch[i].resistance_ohm;
+    }
+    return sum_W;
+}
+
+/* Moves the branches on and returns their mean heat over the step, by Simpson's rule on voltages
+ * that are exact. */
+static double advance_branches(const cell_t *cell, double *polarisation_V, double current_A)
+{
+    double mean_W = 0.0;
+    for (uint32_t i = 0u; i < cell->branches; i++) {
+        const cell_branch_t *branch = &cell->branch[i];
+        const double steady_V = -current_A * branch->resistance_ohm;
+        const double begin_V = polarisation_V[i];
+        const double middle_V = steady_V + (begin_V - steady_V) * branch->left_at_middle;
+        const double end_V = steady_V + (begin_V - steady_V) * branch->left_at_end;
+        mean_W += (begin_V * begin_V + 4.0 * middle_V * middle_V + end_V * end_V) /
+                  (6.0 * branch->resistance_ohm);
+        polarisation_V[i] = end_V;
+    }
+    return mean_W;
+}
+
+void cell_step(const cell_t *cell, cell_memory_t *memory, double current_A, double cooling_power_W,
+               const cell_state_t *before, const cell_state_t *after)
+{
+    const cell_thermal_step_t *map = &cell->thermal;
+    cell_state_t *state = &memory->state;
+    const double soc_change =
+        cell->step_s * (0.5 * (before->soc + after->soc) - current_A / cell->capacity_As);
+    const double middle_K = state->core + 0.5 * memory->core_change_K;
+    const double core_W = heat_W(cell, middle_K, state->soc + 0.5 * soc_change, current_A) +
+                          advance_branches(cell, memory->polarisation_V, current_A);
+    const double core_gap_K = state->core - state->surface;
+    const double coolant_gap_K = state->coolant - state->surface;
+    double change_K[3];
+    for (uint32_t i = 0u; i < 3u; i++) {
+        const double *b = map->before_s[i];
+        const double *a = map->after_s[i];
+        change_K[i] = (map->core_gap[i] * core_gap_K + map->coolant_gap[i] * coolant_gap_K) +
+                      (map->heat_K_per_W[i] * core_W - map->cooling_K_per_W[i] * cooling_power_W) +
+                      (b[0] * before->core + b[1] * before->surface + b[2] * before->coolant) +
+                      (a[0] * after->core + a[1] * after->surface + a[2] * after->coolant);
+    }
+    state->soc += soc_change;
+    state->core += change_K[0];
+    state->surface += change_K[1];
+    state->coolant += change_K[2];
+    memory->core_change_K = change_K[0];
 }
 
 double cell_open_circuit_voltage_V(const cell_t *cell, double soc)
 {
-    const uint32_t last = cell->ocv_points - 1u;
-    if (soc <= cell->ocv_soc[0]) {
-        return cell->ocv_V[0];
-    }
-    if (soc >= cell->ocv_soc[last]) {
-        return cell->ocv_V[last];
-    }
-    uint32_t i = 0u;
-    while (soc >= cell->ocv_soc[i + 1u]) {
-        i++;
-    }
-    const double slope_V =
-        (cell->ocv_V[i + 1u] - cell->ocv_V[i]) / (cell->ocv_soc[i + 1u] - cell->ocv_soc[i]);
-    return slope_V * (soc - cell->ocv_soc[i]) + cell->ocv_V[i];
+    const double within_V = curve_at(&cell->ocv_V, soc);
+    return (soc > 1.0) ? within_V + cell->overfill_slope_V * (soc - 1.0) : within_V;
 }
 
-double cell_terminal_voltage_V(const cell_t *cell, double soc, double current_A)
+double cell_terminal_voltage_V(const cell_t *cell, const cell_memory_t *memory, double current_A)
 {
-    return cell_open_circuit_voltage_V(cell, soc) - current_A * cell->ohmic_resistance_ohm;
+    const cell_state_t *state = &memory->state;
+    double voltage_V = cell_open_circuit_voltage_V(cell, state->soc) -
+                       current_A * resistance_ohm(cell, state->core, state->soc);
+    for (uint32_t i = 0u; i < cell->branches; i++) {
+        voltage_V += memory->polarisation_V[i];
+    }
+    return voltage_V;
 }

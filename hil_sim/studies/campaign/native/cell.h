@@ -1,13 +1,51 @@
-/* The true cell in double precision: the equations of bms/cell/model.py, operation by operation,
- * so that a charge here and one of hil_sim/plant/plant.py give the same bits. */
+/* The true cell in double precision: the equations of bms/cell/model.py with an exact step of their
+ * linear, thermal part. The heat of a step is that in its middle. */
 #ifndef CELL_H
 #define CELL_H
 
 #include <stdint.h>
 
-#define CELL_MAX_OCV_POINTS 64
+#define CELL_MAX_POINTS 64
+#define CELL_MAX_TABLE 1024
+#define CELL_MAX_BRANCHES 3
+
+/* Values over a rising axis, linear between the points; beyond the axis its edge holds. */
+typedef struct {
+    uint32_t points;
+    double axis[CELL_MAX_POINTS];
+    double value[CELL_MAX_POINTS];
+} cell_curve_t;
+
+/* Resistance over temperature (rows) and state of charge (columns); no rows: a constant. */
+typedef struct {
+    uint32_t rows;
+    uint32_t columns;
+    double temperature_K[CELL_MAX_POINTS];
+    double soc[CELL_MAX_POINTS];
+    double ohm[CELL_MAX_TABLE];
+} cell_resistance_t;
+
+/* A branch of polarisation; what is left of a voltage after half a sub-step and a whole one. */
+typedef struct {
+    double resistance_ohm;
+    double left_at_middle;
+    double left_at_end;
+} cell_branch_t;
+
+/* Change of core, surface and coolant temperature in a sub-step: of each, per kelvin that the core
+ * and the coolant are above the surface, per K/s of the disturbance of each at the beginning and
+ * at the end, per watt of heat in the core and per watt of cooling. */
+typedef struct {
+    double core_gap[3];
+    double coolant_gap[3];
+    double before_s[3][3];
+    double after_s[3][3];
+    double heat_K_per_W[3];
+    double cooling_K_per_W[3];
+} cell_thermal_step_t;
 
 typedef struct {
+    double step_s;
     double capacity_As;
     double core_resistance_K_per_W;
     double core_heat_capacity_J_per_K;
@@ -16,12 +54,16 @@ typedef struct {
     double coolant_heat_capacity_J_per_K;
     double ohmic_resistance_ohm;
     double entropic_coefficient_V_per_K;
-    uint32_t ocv_points;
-    double ocv_soc[CELL_MAX_OCV_POINTS];
-    double ocv_V[CELL_MAX_OCV_POINTS];
+    double overfill_slope_V;
+    cell_curve_t ocv_V;
+    cell_curve_t entropy_V_per_K; /* no points: the constant */
+    cell_resistance_t resistance;
+    uint32_t branches;
+    cell_branch_t branch[CELL_MAX_BRANCHES];
+    cell_thermal_step_t thermal;
 } cell_t;
 
-/* State of charge (-) and three temperatures (K); also their rates (1/s, K/s). */
+/* State of charge (-) and three temperatures (K), or their rates (1/s, K/s). */
 typedef struct {
     double soc;
     double core;
@@ -29,18 +71,26 @@ typedef struct {
     double coolant;
 } cell_state_t;
 
-/* Rates at a current (negative while charging) and a cooling power, plus a disturbance of each. */
-cell_state_t cell_rates(const cell_t *cell, const cell_state_t *state, double current_A,
-                        double cooling_power_W, const cell_state_t *disturbance);
+/* What a cell carries from step to step. */
+typedef struct {
+    cell_state_t state;
+    double polarisation_V[CELL_MAX_BRANCHES];
+    double core_change_K; /* in the last step; 0 before the first */
+} cell_memory_t;
 
-/* One Runge-Kutta step of fourth order; first_rates are those at its beginning, and the
- * disturbance runs linearly from before to after. */
-cell_state_t cell_step(const cell_t *cell, const cell_state_t *state, double current_A,
-                       double cooling_power_W, double step_s, const cell_state_t *first_rates,
-                       const cell_state_t *before, const cell_state_t *after);
+/* Heat in W of resistance and entropy at a current, which is negative while charging. */
+double cell_heat_W(const cell_t *cell, const cell_state_t *state, double current_A);
+
+/* Heat in W of the branches at their present voltages. */
+double cell_polarisation_heat_W(const cell_t *cell, const double *polarisation_V);
+
+/* One sub-step at constant current and cooling power; the disturbance runs linearly from before to
+ * after. */
+void cell_step(const cell_t *cell, cell_memory_t *memory, double current_A, double cooling_power_W,
+               const cell_state_t *before, const cell_state_t *after);
 
 double cell_open_circuit_voltage_V(const cell_t *cell, double soc);
 
-double cell_terminal_voltage_V(const cell_t *cell, double soc, double current_A);
+double cell_terminal_voltage_V(const cell_t *cell, const cell_memory_t *memory, double current_A);
 
 #endif

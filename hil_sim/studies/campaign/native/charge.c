@@ -4,20 +4,51 @@
 
 #define KNOT_WIDTH 4
 
+static double larger(double a, double b)
+{
+    return (a > b) ? a : b;
+}
+
+static double within(double value, double low, double high)
+{
+    return (value < low) ? low : ((value > high) ? high : value);
+}
+
+static charge_differences_t differences_of(const cell_t *cell, const cell_t *nominal)
+{
+    const double core = cell->core_resistance_K_per_W;
+    const double surface = cell->surface_resistance_K_per_W;
+    const double nominal_core = nominal->core_resistance_K_per_W;
+    const double nominal_surface = nominal->surface_resistance_K_per_W;
+    return (charge_differences_t){
+        .soc_per_As = 1.0 / nominal->capacity_As - 1.0 / cell->capacity_As,
+        .core_gap_per_s = 1.0 / (nominal_core * nominal->core_heat_capacity_J_per_K) -
+                          1.0 / (core * cell->core_heat_capacity_J_per_K),
+        .surface_core_per_s = 1.0 / (core * cell->surface_heat_capacity_J_per_K) -
+                              1.0 / (nominal_core * nominal->surface_heat_capacity_J_per_K),
+        .surface_gap_per_s = 1.0 / (nominal_surface * nominal->surface_heat_capacity_J_per_K) -
+                             1.0 / (surface * cell->surface_heat_capacity_J_per_K),
+        .coolant_gap_per_s = 1.0 / (surface * cell->coolant_heat_capacity_J_per_K) -
+                             1.0 / (nominal_surface * nominal->coolant_heat_capacity_J_per_K),
+        .coolant_K_per_J = 1.0 / nominal->coolant_heat_capacity_J_per_K -
+                           1.0 / cell->coolant_heat_capacity_J_per_K,
+    };
+}
+
 void charge_begin(charge_t *charge, const bms_calibration_t *calibration)
 {
     const bms_config_t config = { .calibration = calibration };
-    const cell_state_t *start = &charge->state;
+    const cell_state_t *start = &charge->memory.state;
     bms_init(&charge->link.bms, &config);
-    charge->plug_in_soc = start->soc;
     charge->outcome = CHARGE_RUNNING;
     charge->first_derate_s = -1.0;
     charge->first_fault = FAULT_NONE;
     charge->surface_error_K_per_s = NAN;
+    charge->differences = differences_of(&charge->cell, &charge->scenario->nominal);
     charge->peaks = (charge_peaks_t){
         .core_temperature_K = start->core,
         .surface_temperature_K = start->surface,
-        .voltage_V = cell_terminal_voltage_V(&charge->cell, start->soc, charge->current_A),
+        .voltage_V = cell_terminal_voltage_V(&charge->cell, &charge->memory, charge->current_A),
         .soc = start->soc,
     };
 }
@@ -27,16 +58,16 @@ static void measure(const charge_t *charge, const double *normals, double readin
     const charge_scenario_t *scenario = charge->scenario;
     const double truth[LINK_READINGS] = {
         charge->current_A,
-        cell_terminal_voltage_V(&charge->cell, charge->state.soc, charge->current_A),
-        charge->state.surface,
-        charge->state.coolant,
+        cell_terminal_voltage_V(&charge->cell, &charge->memory, charge->current_A),
+        charge->memory.state.surface,
+        charge->memory.state.coolant,
         charge->cooling_power_W,
     };
     for (uint32_t i = 0u; i < LINK_READINGS; i++) {
         const charge_sensor_t *sensor = &scenario->sensors[i];
         const double normal =
-            fmin(fmax(normals[i], -scenario->noise_cutoff), scenario->noise_cutoff);
-        const double value = truth[i] + sensor->bias + sensor->noise_std * normal;
+            within(normals[i], -scenario->noise_cutoff, scenario->noise_cutoff);
+        const double value = truth[i] + charge->bias[i] + sensor->noise_std * normal;
         readings[i] = (sensor->resolution == 0.0)
                           ? value
                           : sensor->resolution * rint(value / sensor->resolution);
@@ -52,7 +83,7 @@ static void note_firmware(charge_t *charge, uint32_t state)
     if (!charge->requested) {
         return;
     }
-    const double error_K = fabs((double)bms->estimate.core_temperature_K - charge->state.core);
+    const double error_K = fabs((double)bms->estimate.core_temperature_K - charge->memory.state.core);
     charge->peaks.estimate_error_K = fmax(charge->peaks.estimate_error_K, error_K);
     if (((state == BMS_CHARGING) || (state == BMS_DERATED)) && !bms->decision.feasible) {
         charge->infeasible_periods++;
@@ -74,7 +105,7 @@ static bool is_full(charge_t *charge, double reading_A)
 {
     const charge_scenario_t *scenario = charge->scenario;
     if (charge->controller == CHARGE_S_CBF) {
-        return charge->state.soc >= scenario->completion_soc;
+        return charge->memory.state.soc >= scenario->completion_soc;
     }
     if (charge->periods == charge->edge_period) {
         charge->counted_soc = link_over_the_bus(&scenario->signals.plug_in_soc, charge->plug_in_soc);
@@ -100,7 +131,7 @@ static link_answer_t ask_baseline(charge_t *charge, const double readings[LINK_R
     } else if (charge->requested) {
         const double current_A =
             (charge->controller == CHARGE_S_CBF)
-                ? baseline_s_cbf_A(&scenario->baselines, &scenario->nominal, &charge->state,
+                ? baseline_s_cbf_A(&scenario->baselines, &scenario->nominal, &charge->memory.state,
                                    charge->cooling_power_W, reference_A)
                 : baseline_cc_cv_A(&scenario->baselines, heard[0], heard[1], heard[2], reference_A);
         answer.state = (current_A == reference_A) ? BMS_CHARGING : BMS_DERATED;
@@ -127,56 +158,108 @@ static charge_outcome_t outcome_of(const charge_t *charge, uint32_t state)
     return (run_s >= scenario->max_time_s) ? CHARGE_TIME_LIMIT : CHARGE_RUNNING;
 }
 
-static double larger_abs(double peak, double value)
+static void note_model_error(charge_t *charge, const cell_state_t *disturbance)
 {
-    return fmax(peak, fabs(value));
-}
-
-static void note_model_error(charge_t *charge, const cell_state_t *rates, double step_s)
-{
-    static const cell_state_t UNDISTURBED = { 0.0, 0.0, 0.0, 0.0 };
-    const cell_state_t nominal = cell_rates(&charge->scenario->nominal, &charge->state,
-                                            charge->current_A, charge->cooling_power_W,
-                                            &UNDISTURBED);
-    const double surface_K_per_s = rates->surface - nominal.surface;
+    const charge_differences_t *less = &charge->differences;
+    const cell_t *nominal = &charge->scenario->nominal;
+    const cell_state_t *state = &charge->memory.state;
+    const double core_gap_K = state->core - state->surface;
+    const double surface_gap_K = state->surface - state->coolant;
+    const double heat_K_per_s =
+        (cell_heat_W(&charge->cell, state, charge->current_A) +
+         cell_polarisation_heat_W(&charge->cell, charge->memory.polarisation_V)) /
+            charge->cell.core_heat_capacity_J_per_K -
+        cell_heat_W(nominal, state, charge->current_A) / nominal->core_heat_capacity_J_per_K;
+    const double surface_K_per_s = disturbance->surface + less->surface_core_per_s * core_gap_K +
+                                   less->surface_gap_per_s * surface_gap_K;
     charge_peaks_t *peaks = &charge->peaks;
     cell_state_t *error = &peaks->model_error;
-    error->soc = larger_abs(error->soc, rates->soc - nominal.soc);
-    error->core = larger_abs(error->core, rates->core - nominal.core);
-    error->surface = larger_abs(error->surface, surface_K_per_s);
-    error->coolant = larger_abs(error->coolant, rates->coolant - nominal.coolant);
+    error->soc =
+        larger(error->soc, fabs(disturbance->soc + less->soc_per_As * charge->current_A));
+    error->core = larger(error->core, fabs(disturbance->core + heat_K_per_s +
+                                           less->core_gap_per_s * core_gap_K));
+    error->surface = larger(error->surface, fabs(surface_K_per_s));
+    error->coolant = larger(error->coolant,
+                            fabs(disturbance->coolant + less->coolant_gap_per_s * surface_gap_K +
+                                 less->coolant_K_per_J * charge->cooling_power_W));
     if (!isnan(charge->surface_error_K_per_s)) {
         peaks->surface_error_slope_K_per_s2 =
-            larger_abs(peaks->surface_error_slope_K_per_s2,
-                       (surface_K_per_s - charge->surface_error_K_per_s) / step_s);
+            larger(peaks->surface_error_slope_K_per_s2,
+                   fabs((surface_K_per_s - charge->surface_error_K_per_s) / charge->cell.step_s));
     }
     charge->surface_error_K_per_s = surface_K_per_s;
+}
+
+/* Factor on a knot's core at the present current; 1 where the bound does not depend on it. */
+static double core_growth(const charge_t *charge)
+{
+    const charge_core_bound_t *bound = &charge->scenario->core_bound;
+    if (bound->at_reference_K_per_s == bound->constant_K_per_s) {
+        return 1.0;
+    }
+    const double strength_A = fabs(charge->current_A);
+    const double at_current_K_per_s = bound->constant_K_per_s + bound->per_A_K_per_As * strength_A +
+                                      bound->per_A2_K_per_A2s * strength_A * strength_A;
+    return at_current_K_per_s / bound->at_reference_K_per_s;
+}
+
+static void note_voltage(charge_t *charge, const cell_memory_t *memory)
+{
+    const double voltage_V = cell_terminal_voltage_V(&charge->cell, memory, charge->current_A);
+    charge->peaks.voltage_V = larger(charge->peaks.voltage_V, voltage_V);
 }
 
 static void advance_plant(charge_t *charge, const double *knots)
 {
     charge_peaks_t *peaks = &charge->peaks;
-    const double step_s = charge->scenario->period_s / CHARGE_SUB_STEPS;
-    double highest_soc = charge->state.soc;
+    cell_memory_t *memory = &charge->memory;
+    const bool is_plain = (charge->cell.branches == 0u) && (charge->cell.resistance.rows == 0u);
+    const double growth = core_growth(charge);
+    cell_state_t before = charge->knot;
+    before.core *= growth;
+    cell_memory_t fullest = *memory;
+    if (!is_plain) {
+        note_voltage(charge, memory);
+    }
     for (uint32_t i = 0u; i < CHARGE_SUB_STEPS; i++) {
         const double *end = &knots[i * KNOT_WIDTH];
-        const cell_state_t after = { end[0], end[1], end[2], end[3] };
-        const cell_state_t rates = cell_rates(&charge->cell, &charge->state, charge->current_A,
-                                              charge->cooling_power_W, &charge->knot);
-        if (charge->controller == CHARGE_KAN_RCBF) {
-            note_model_error(charge, &rates, step_s);
+        const cell_state_t after = { end[0], end[1] * growth, end[2], end[3] };
+        if (charge->watches_model_error) {
+            note_model_error(charge, &before);
         }
-        charge->state = cell_step(&charge->cell, &charge->state, charge->current_A,
-                                  charge->cooling_power_W, step_s, &rates, &charge->knot, &after);
-        charge->knot = after;
-        highest_soc = fmax(highest_soc, charge->state.soc);
-        peaks->core_temperature_K = fmax(peaks->core_temperature_K, charge->state.core);
-        peaks->surface_temperature_K = fmax(peaks->surface_temperature_K, charge->state.surface);
+        cell_step(&charge->cell, memory, charge->current_A, charge->cooling_power_W, &before,
+                  &after);
+        before = after;
+        fullest.state.soc = larger(fullest.state.soc, memory->state.soc);
+        peaks->core_temperature_K = larger(peaks->core_temperature_K, memory->state.core);
+        peaks->surface_temperature_K = larger(peaks->surface_temperature_K, memory->state.surface);
+        if (!is_plain) {
+            note_voltage(charge, memory);
+        }
     }
-    peaks->soc = fmax(peaks->soc, highest_soc);
-    /* At one current the voltage rises with the state of charge, so its peak is there. */
-    peaks->voltage_V = fmax(peaks->voltage_V, cell_terminal_voltage_V(&charge->cell, highest_soc,
-                                                                      charge->current_A));
+    const double *last = &knots[(CHARGE_SUB_STEPS - 1) * KNOT_WIDTH];
+    charge->knot = (cell_state_t){ last[0], last[1], last[2], last[3] };
+    peaks->soc = larger(peaks->soc, fullest.state.soc);
+    if (is_plain) {
+        /* At one current the voltage rises with the state of charge, so its peak is there. */
+        note_voltage(charge, &fullest);
+    }
+}
+
+/* Current of the coming period, from an answer: as hil_sim/plant/charger.py. */
+static void supply(charge_t *charge, const link_answer_t *answer)
+{
+    const double command_A =
+        answer->intact ? within(answer->command_A, charge->scenario->reference_current_A, 0.0) : 0.0;
+    const bool goes_on = (answer->state != BMS_COMPLETE) && (answer->state != BMS_FAULT);
+    if (charge->requested && goes_on && (charge->command_A < 0.0) && (command_A == 0.0)) {
+        charge->stops++;
+    }
+    charge->command_A = command_A;
+    charge->lagged_A = (charge->supply_share == 1.0)
+                           ? command_A
+                           : charge->lagged_A + charge->supply_share * (command_A - charge->lagged_A);
+    charge->current_A = charge->supply_gain * charge->lagged_A;
 }
 
 static void run_period(charge_t *charge, const double *normals, const double *knots)
@@ -187,8 +270,7 @@ static void run_period(charge_t *charge, const double *normals, const double *kn
     const link_answer_t answer = (charge->controller == CHARGE_KAN_RCBF)
                                      ? ask_firmware(charge, readings)
                                      : ask_baseline(charge, readings);
-    charge->current_A =
-        answer.intact ? fmin(fmax(answer.command_A, scenario->reference_current_A), 0.0) : 0.0;
+    supply(charge, &answer);
     if (charge->requested) {
         charge->time_s = (double)(charge->periods - charge->edge_period) * scenario->period_s;
         if ((answer.state == BMS_DERATED) && (charge->first_derate_s < 0.0)) {

@@ -23,8 +23,15 @@ typedef enum { CHARGE_KAN_RCBF = 0, CHARGE_S_CBF = 1, CHARGE_CC_CV = 2 } charge_
 typedef struct {
     double resolution;
     double noise_std;
-    double bias;
 } charge_sensor_t;
+
+/* Bound on the disturbance of the core over the current; knots have the one at the reference. */
+typedef struct {
+    double constant_K_per_s;
+    double per_A_K_per_As;
+    double per_A2_K_per_A2s;
+    double at_reference_K_per_s;
+} charge_core_bound_t;
 
 /* What all runs of a campaign have in common. */
 typedef struct {
@@ -38,6 +45,7 @@ typedef struct {
     uint32_t starting_periods; /* the same while it says that it is still starting */
     cell_t nominal;         /* the cell that the controllers know */
     charge_sensor_t sensors[LINK_READINGS];
+    charge_core_bound_t core_bound;
     link_signals_t signals;
     baseline_constants_t baselines;
 } charge_scenario_t;
@@ -53,15 +61,32 @@ typedef struct {
     double surface_error_slope_K_per_s2;
 } charge_peaks_t;
 
+/* True less nominal rates are these times what is behind them, plus the disturbance. */
+typedef struct {
+    double soc_per_As;           /* current */
+    double core_gap_per_s;       /* core less surface */
+    double surface_core_per_s;   /* core less surface */
+    double surface_gap_per_s;    /* surface less coolant */
+    double coolant_gap_per_s;    /* surface less coolant */
+    double coolant_K_per_J;      /* cooling power */
+} charge_differences_t;
+
 typedef struct {
     const charge_scenario_t *scenario;
     charge_controller_t controller;
     cell_t cell;
     double cooling_power_W;
-    double plug_in_soc;
-    cell_state_t state;
-    cell_state_t knot; /* disturbance at the present instant */
+    double plug_in_soc;           /* as the charger tells it */
+    double bias[LINK_READINGS];   /* of the sensors */
+    double supply_gain;           /* current supplied over the one commanded */
+    double supply_share;          /* of the way to a command in a period, by the charger's lag */
+    bool watches_model_error;
+    cell_memory_t memory;
+    cell_state_t knot; /* disturbance at the present instant, the core's at the reference current */
     double current_A;
+    double lagged_A; /* current before the charger's gain */
+    double command_A;
+    charge_differences_t differences;
     charge_outcome_t outcome;
     uint32_t periods;
     bool requested;
@@ -70,14 +95,14 @@ typedef struct {
     double first_derate_s; /* negative: never */
     uint32_t first_fault;  /* FAULT_NONE: none */
     uint32_t infeasible_periods;
+    uint32_t stops; /* from a current to a command of 0 A, while the charge goes on */
     double surface_error_K_per_s; /* at the last sub-step; NaN before the first */
     double counted_soc;           /* by CC-CV, from its measurements */
     charge_peaks_t peaks;
     link_t link;
 } charge_t;
 
-/* Prepares a charge whose scenario, controller, cell, cooling_power_W, state and knot are set and
- * whose other members are zero. The calibration is the firmware's and must outlive the charge. */
+/* Prepares a charge whose members from scenario to knot are set and whose others are zero. The calibration is the firmware's and must outlive the charge. */
 void charge_begin(charge_t *charge, const bms_calibration_t *calibration);
 
 /* Runs up to `periods` control periods, with LINK_READINGS standard normal numbers for each and
