@@ -30,7 +30,13 @@ def make_plant(spec: str, preset: Preset, disturbance: Source) -> PlantLike:
             f"{', '.join([*_OWN, *sorted(registered)])}, or install a package that registers "
             f"'{name}' as an entry point of the group {ENTRY_POINTS}"
         )
-    maker: PlantMaker = registered[name].load()
+    try:
+        maker: PlantMaker = registered[name].load()
+    except (ImportError, AttributeError) as error:
+        raise InputError(
+            f"--plant {spec}: '{registered[name].value}' cannot be loaded ({error}); "
+            "mend or reinstall the package that registers it"
+        ) from None
     return maker(argument, preset, disturbance)
 
 

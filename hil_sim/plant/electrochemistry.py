@@ -16,11 +16,21 @@ DIFFUSIVITY_FACTOR = 3.0
 """On the particles' diffusivity of the set, which is too slow for the measured 2C charge."""
 REFERENCE_TEMPERATURE_K = 298.0
 """At which the set's open-circuit potentials hold."""
-DEFAULT_POINTS = 20
+ELECTRODE_POINTS, PARTICLE_POINTS = 10, 20
+PARTICLE_STRETCH = 3.0
+"""Crowds the points of a particle near its surface, where its concentration changes most.
+
+Evenly spread, 20 points miss the voltage at 10C by 70 mV; so, they are within 2 mV of 200.
+"""
+LARGEST_VOLTAGE_V = 10.0
+"""Beyond it an electrode is full or empty, and the equations describe no cell any more."""
 
 _VOLTAGE, _HEAT = "Voltage [V]", "Total heating [W]"
 _ANODE = "Negative electrode surface potential difference at separator interface [V]"
 _STOICHIOMETRY = "Negative electrode stoichiometry"
+_POINTS = {name: ELECTRODE_POINTS for name in ("x_n", "x_s", "x_p")} | {
+    name: PARTICLE_POINTS for name in ("r_n", "r_p")
+}
 _CURRENT, _TEMPERATURE = "Current function [A]", "Ambient temperature [K]"
 
 
@@ -49,7 +59,6 @@ class Electrochemistry:
         soc: float,
         temperature_K: float,
         step_s: float,
-        points: int = DEFAULT_POINTS,
     ) -> None:
         pybamm = import_pybamm()
         parameters = _parameters(pybamm, DIFFUSIVITY_FACTOR)
@@ -75,7 +84,8 @@ class Electrochemistry:
             equations,
             parameter_values=parameters,
             solver=self._solver,
-            var_pts={name: points for name in ("x_n", "x_s", "x_p", "r_n", "r_p")},
+            submesh_types=_meshes(pybamm, equations),
+            var_pts=_POINTS,
         )
         simulation.build()
         self._model, self._step_s = simulation.built_model, step_s
@@ -102,7 +112,13 @@ class Electrochemistry:
                 f"({str(error).splitlines()[0]}); start at another state of charge, or take a "
                 "preset with a smaller current"
             ) from None
-        return self._outputs(0), self._outputs(-1)
+        begin, end = self._outputs(0), self._outputs(-1)
+        if not abs(end.voltage_V) < LARGEST_VOLTAGE_V:
+            raise PlantError(
+                f"--plant pybamm: {current_A:g} A at state of charge {end.soc:.3f} empties or "
+                "fills an electrode; the controller charges beyond what the cell can hold"
+            )
+        return begin, end
 
     def keep(self) -> None:
         """Take the end of the last step as the present state."""
@@ -136,6 +152,17 @@ def import_pybamm() -> ModuleType:
 
 def _inputs(current_A: float, temperature_K: float) -> dict[str, float]:
     return {_CURRENT: current_A, _TEMPERATURE: temperature_K}
+
+
+def _meshes(pybamm: ModuleType, equations: Any) -> dict[str, Any]:
+    particle = pybamm.MeshGenerator(
+        pybamm.Exponential1DSubMesh, {"side": "right", "stretch": PARTICLE_STRETCH}
+    )
+    return {
+        **equations.default_submesh_types,
+        "negative particle": particle,
+        "positive particle": particle,
+    }
 
 
 def _parameters(pybamm: ModuleType, diffusivity_factor: float) -> Any:

@@ -8,7 +8,6 @@ from bms.presets import Preset
 from hil_sim.plant.arguments import Range, split_argument
 from hil_sim.plant.disturbances import Source
 from hil_sim.plant.electrochemistry import (
-    DEFAULT_POINTS,
     MODELS,
     REFERENCE_TEMPERATURE_K,
     Electrochemistry,
@@ -26,11 +25,11 @@ MEASURED_ENTROPY = EntropyTable(
 )  # fmt: skip
 """dU/dT of the A123 26650, measured; source: A. Kawakita de Souza, UCCS, A123_26650_MPCcharging."""
 
-_OPTIONS = {"contact": Range(0.0, 0.1, "ohm"), "points": Range(5, 100, "")}
+_OPTIONS = {"contact": Range(0.0, 0.1, "ohm")}
 
 
 def make(argument: str, preset: Preset, disturbance: Source) -> PybammPlant:
-    """The plant of `pybamm[:MODEL[,contact=OHM][,points=N]]`; InputError for another argument."""
+    """The plant of `pybamm[:MODEL[,contact=OHM]]`; InputError for another argument."""
     model, options = split_argument("pybamm", argument or "spme", _OPTIONS)
     if model not in MODELS:
         raise InputError(
@@ -41,7 +40,6 @@ def make(argument: str, preset: Preset, disturbance: Source) -> PybammPlant:
         preset.initial.soc,
         preset.initial.temperature_K,
         preset.timing.sampling_period_s,
-        int(options.get("points", DEFAULT_POINTS)),
     )
     return PybammPlant(preset, disturbance, cell, options.get("contact", 0.0))
 
