@@ -103,8 +103,9 @@ def _branches(preset: Preset) -> dict[str, Any]:
         "branches": len(cell.branches),
         "branch": [
             {
-                "rise": bounds.exponential_share(period_s, branch.time_constant_s * factor),
-                "fall": bounds.exponential_share(period_s, branch.time_constant_s / factor),
+                "slow": _DOWN * bounds.exponential_share(period_s, branch.time_constant_s * factor),
+                "fast": _UP * bounds.exponential_share(period_s, branch.time_constant_s / factor),
+                "resistance_ohm": _UP * interval.polarisation[1] * branch.resistance_ohm,
                 "drift_ohm_per_s": interval.polarisation[1]
                 * branch.resistance_ohm
                 * factor

@@ -236,9 +236,8 @@ def _claimed(
     soc = trial.state.soc
     family.soc_low.soc, family.soc_high.soc = max(soc - loose, 0.0), soc + loose
     family.soc_known = True
-    family.strongest_A = max(*strengths_A, -trial.current_A, 0.0)
     for i in range(len(branches)):
-        family.weakest_A[i] = min(strengths_A[i], -trial.current_A)
+        family.strong_A[i] = family.weak_A[i] = strengths_A[i]
     family.supply_low_A = family.supply_high_A = -command_A
     for i in range(2):
         family.commands_A[i] = -command_A

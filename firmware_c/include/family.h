@@ -24,11 +24,13 @@ extern "C" {
 #define FAMILY_MAP_TEMPERATURES 8
 #define FAMILY_MAP_CHARGES 8
 
-/* A branch of the polarisation: how a lower bound of its current follows that of the cell. */
+/* A branch of the polarisation: shares of its way to the cell's current that the current in its
+ * resistance goes in a period, at its slowest and at its fastest. */
 typedef struct {
-    float rise; /* shares of the way that the bound goes in a period */
-    float fall;
-    float drift_ohm_per_s; /* greatest resistance over least time constant */
+    float slow;
+    float fast;
+    float resistance_ohm;  /* greatest */
+    float drift_ohm_per_s; /* that over the least time constant */
 } family_branch_t;
 
 /* Strongest current over temperature and state of charge, linear between the points. */
@@ -56,7 +58,7 @@ typedef struct {
     float resistance_ohm[FAMILY_TEMPERATURES];
     float least_resistance_ohm;
     float polarisation_ohm;
-    float relaxation; /* share of the polarisation that is left after a period, at most */
+    float relaxation; /* share of the polarisation at plug-in that is left after a period, at most */
     float rest_polarisation_V; /* of either sign, at plug-in or after a load */
     float rest_drift_per_s;
     uint32_t branches;
@@ -108,8 +110,10 @@ typedef struct {
     soc_counter_t soc_high;
     bool soc_known;
     uint32_t bridged;             /* periods without usable readings, in a row */
-    float strongest_A;            /* no branch holds the polarisation of a stronger current */
-    float weakest_A[FAMILY_MAX_BRANCHES]; /* nor of a weaker one */
+    float strength_A; /* at the last reading */
+    float strong_A[FAMILY_MAX_BRANCHES]; /* what flows in each branch's resistance, at most */
+    float weak_A[FAMILY_MAX_BRANCHES];   /* and at least */
+    float strongest_A;                   /* of the cell's current and those at most */
     float rest_polarisation_V;
     float commands_A[2]; /* strengths, the last one first */
     float supply_low_A;

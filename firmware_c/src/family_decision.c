@@ -29,7 +29,7 @@ static float drift_V(const family_t *family, const family_constants_t *constants
     float per_s = 0.0f;
     for (uint32_t i = 0u; i < constants->branches; i++) {
         per_s += constants->branch[i].drift_ohm_per_s *
-                 larger(0.0f, strength_A - family->weakest_A[i]);
+                 larger(0.0f, strength_A - family->weak_A[i]);
     }
     return constants->hold_s *
                (per_s + constants->rest_drift_per_s * family->rest_polarisation_V) +
@@ -58,6 +58,7 @@ static float voltage_strength_A(const family_constants_t *constants, const famil
 }
 
 typedef struct {
+    float room_K;    /* from the hottest core that is possible to the limit */
     float outflow_W; /* what the heat must not exceed */
     float slope_W_per_A;
     float square_ohm;
@@ -78,6 +79,7 @@ static core_condition_t core_condition(const family_t *family, const family_cons
     const float room_K =
         (estimated_room_K > family->core_room_K) ? estimated_room_K : family->core_room_K;
     return (core_condition_t){
+        .room_K = room_K,
         .outflow_W = constants->outflow_W_per_K * (surface_room_K - room_K) +
                      constants->gain_W_per_K * (room_K - constants->inner_K) -
                      constants->disturbance_W - constants->hold_W,
@@ -148,6 +150,11 @@ rcbf_decision_t family_decide(const family_t *family, const family_constants_t *
         decision.active = RCBF_CORE_UNKNOWN;
     }
     const core_condition_t core = core_condition(family, constants, cell, reading);
+    if ((strength_A >= 0.0f) && !(core.room_K >= 0.0f)) {
+        /* A core that may be too hot waits, though it would cool down with a little current too. */
+        strength_A = -1.0f;
+        decision.active = RCBF_CORE;
+    }
     if ((strength_A >= 0.0f) && !(core_left_W(&core, &heat, strength_A) >= 0.0f)) {
         const float core_A = core_strength_A(&core, &heat);
         if (!(strength_A <= core_A)) {

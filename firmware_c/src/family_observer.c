@@ -34,7 +34,7 @@ static void forget_after_load(family_t *family, const family_constants_t *consta
     family->soc_known = false;
     family->rest_polarisation_V = constants->rest_polarisation_V;
     for (uint32_t i = 0u; i < FAMILY_MAX_BRANCHES; i++) {
-        family->weakest_A[i] = 0.0f;
+        family->weak_A[i] = 0.0f;
     }
 }
 
@@ -100,18 +100,32 @@ static void follow_supply(family_t *family, const family_constants_t *constants,
     family->commands_A[0] = command_A;
 }
 
+/* The current in a branch's resistance follows that of the cell as a first-order lag does; whatever
+ * its time constant, it stays between one that rises fast and falls slowly and the reverse. */
+static void follow_branches(family_t *family, const family_constants_t *constants, float least_A,
+                            float most_A)
+{
+    family->strongest_A = most_A;
+    for (uint32_t i = 0u; i < constants->branches; i++) {
+        const family_branch_t *branch = &constants->branch[i];
+        const float up_A = most_A - family->strong_A[i];
+        const float down_A = least_A - family->weak_A[i];
+        family->strong_A[i] += ((up_A > 0.0f) ? branch->fast : branch->slow) * up_A;
+        family->weak_A[i] += ((down_A > 0.0f) ? branch->slow : branch->fast) * down_A;
+        family->strongest_A = larger(family->strongest_A, family->strong_A[i]);
+    }
+}
+
 static void follow_charge(family_t *family, const family_constants_t *constants, float strength_A)
 {
-    const float least_A = larger(strength_A - constants->current_error_A, 0.0f);
-    const float most_A = strength_A + constants->current_error_A;
+    /* Between two readings the current lies between them. */
+    const float least_A =
+        larger(smaller(strength_A, family->strength_A) - constants->current_error_A, 0.0f);
+    const float most_A = larger(family->strength_A, strength_A) + constants->current_error_A;
+    family->strength_A = strength_A;
     soc_add(&family->soc_low, least_A * constants->least_soc_per_A);
     soc_add(&family->soc_high, most_A * constants->greatest_soc_per_A);
-    family->strongest_A = larger(most_A, constants->relaxation * family->strongest_A);
-    for (uint32_t i = 0u; i < constants->branches; i++) {
-        const float way_A = least_A - family->weakest_A[i];
-        const family_branch_t *branch = &constants->branch[i];
-        family->weakest_A[i] += ((way_A > 0.0f) ? branch->rise : branch->fall) * way_A;
-    }
+    follow_branches(family, constants, least_A, most_A);
     family->rest_polarisation_V *= constants->relaxation;
 }
 
@@ -223,6 +237,15 @@ static bool is_at_rest(const family_constants_t *constants, const family_reading
     return numeric_abs(reading->current_A) <= 2.0f * constants->current_error_A;
 }
 
+static float polarisation_V(const family_t *family, const family_constants_t *constants)
+{
+    float sum_V = 0.0f;
+    for (uint32_t i = 0u; i < constants->branches; i++) {
+        sum_V += constants->branch[i].resistance_ohm * family->strong_A[i];
+    }
+    return sum_V;
+}
+
 /* What resistance and polarisation cannot explain of the voltage is open-circuit voltage. */
 static void look_for_full(family_t *family, const family_constants_t *constants,
                           const family_reading_t *reading)
@@ -231,7 +254,7 @@ static void look_for_full(family_t *family, const family_constants_t *constants,
     const float least_ocv_V =
         reading->voltage_V - constants->voltage_error_V - constants->ocv_error_V -
         family->rest_polarisation_V - heat.resistance_ohm * heat.at_most_A -
-        heat.polarisation_ohm * heat.past_A;
+        polarisation_V(family, constants);
     const bool is_full = reading->is_charging && (least_ocv_V >= constants->full_ocv_V);
     family->full_count = is_full ? (family->full_count + 1u) : 0u;
 }
@@ -253,7 +276,8 @@ static void bridge(family_t *family, const family_constants_t *constants)
         .polarisation_ohm = constants->polarisation_ohm,
     };
     soc_add(&family->soc_high, strength_A * constants->greatest_soc_per_A);
-    family->strongest_A = heat.past_A;
+    follow_branches(family, constants, 0.0f, strength_A);
+    family->strength_A = strength_A;
     family->core_room_K -=
         constants->heating_K_per_W *
         (family_assumed_heat_W(&heat, strength_A) + larger(0.0f, family->entropic_V) * strength_A +
@@ -319,6 +343,6 @@ bool family_voltage_is_plausible(const family_t *family, const family_constants_
                         heat.least_resistance_ohm * heat.at_least_A - spread_V;
     const float high_V = rcbf_open_circuit_voltage_V(cell, family->soc_high.soc) +
                          heat.resistance_ohm * heat.at_most_A +
-                         heat.polarisation_ohm * heat.past_A + spread_V;
+                         polarisation_V(family, constants) + spread_V;
     return (reading->voltage_V >= low_V) && (reading->voltage_V <= high_V);
 }

@@ -155,8 +155,10 @@ static bool branches_are_valid(const family_constants_t *k)
 {
     bool valid = k->branches <= FAMILY_MAX_BRANCHES;
     for (uint32_t i = 0u; valid && (i < k->branches); i++) {
-        valid = is_share(k->branch[i].rise) && is_share(k->branch[i].fall) &&
-                is_not_negative(k->branch[i].drift_ohm_per_s);
+        const family_branch_t *branch = &k->branch[i];
+        valid = is_share(branch->slow) && is_share(branch->fast) &&
+                is_not_negative(branch->resistance_ohm) &&
+                is_not_negative(branch->drift_ohm_per_s);
     }
     return valid;
 }
