@@ -18,6 +18,12 @@ CUT_BACK_SPAN_K = 5.0
 """The cut-back begins this far below the surface limit: 45 degC for a limit of 50 degC."""
 
 
+TAIL_HOURS = 20.0
+"""The cell is full once the charging voltage needs no more than its capacity over this time."""
+REACHED_V = 0.005
+"""How far below it the voltage counts as the charging voltage."""
+
+
 @dataclass(frozen=True)
 class CutBack:
     """Share of the current: 1 up to begin_K of the surface, 0 from end_K, linear between."""
@@ -31,6 +37,11 @@ class CutBack:
         return min(max(left, 0.0), 1.0)
 
 
+def tail_current_A(preset: Preset) -> float:
+    """Strength in A of the current at which a charge at constant voltage ends."""
+    return preset.cell.capacity_Ah / TAIL_HOURS
+
+
 class CcCvController:
     """CC-CV charger of one cell with a cut-back by surface temperature."""
 
@@ -41,6 +52,13 @@ class CcCvController:
         limit_K = preset.limits.max_surface_temperature_K
         self._preset = preset
         self._cut_back = cut_back or CutBack(limit_K - CUT_BACK_SPAN_K, limit_K)
+
+    def is_full(self, observation: Observation) -> bool:
+        """Whether the current that holds the charging voltage has become small."""
+        return bool(
+            observation.voltage_V >= charging_voltage_V(self._preset) - REACHED_V
+            and -observation.current_A <= tail_current_A(self._preset)
+        )
 
     def decide(self, observation: Observation) -> Decision:
         """Charging current for the next period; 0 A and "invalid" without usable measurements."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+from bms.baselines.cc_cv import CcCvController
 from bms.decision import ACTIVE_CONSTRAINTS, Controller, Decision, Observation
 from bms.presets import Preset
 from hil_sim.bus.buses import Frame
@@ -70,6 +71,8 @@ class PythonEcu:
         decision = None
         if self._controller is not None:
             self._complete |= observation.soc >= self._limits.completion_soc
+            if isinstance(self._controller, CcCvController):
+                self._complete |= self._controller.is_full(observation)
             if not self._complete:
                 decision = self._controller.decide(observation)
         values = _values(observation, decision, self._state(decision))

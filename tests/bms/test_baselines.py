@@ -169,6 +169,20 @@ def test_cc_cv_is_cut_back_linearly_over_the_last_five_kelvin(surface_K, share):
     assert decision.active_constraint == ("none" if share == 1.0 else "surface")
 
 
+@pytest.mark.parametrize(
+    ("below_V", "beyond_tail_A", "is_full"),
+    [(0.0, -0.001, True), (0.0, 0.001, False), (0.0049, -0.001, True), (0.0051, -0.001, False)],
+)
+def test_cc_cv_is_full_at_its_voltage_with_no_more_than_a_twentieth_of_the_capacity(
+    below_V, beyond_tail_A, is_full
+):
+    highest_V = LIMITS.max_voltage_V - PRESET.sensors.voltage_V.error_bound
+    current_A = -(PRESET.cell.capacity_Ah / 20.0 + beyond_tail_A)
+    told = measured(voltage_V=highest_V - below_V, current_A=current_A)
+    assert CcCvController(PRESET).is_full(told) is is_full
+    assert not CcCvController(PRESET).is_full(measured(voltage_V=math.nan, current_A=0.0))
+
+
 def test_the_cut_back_can_be_set():
     charger = CcCvController(PRESET, CutBack(begin_K=300.0, end_K=310.0))
     assert charger.decide(measured(surface_K=307.5)).current_A == pytest.approx(0.25 * FULL_A)

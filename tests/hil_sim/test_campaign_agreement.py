@@ -157,3 +157,26 @@ def test_a_cell_of_the_family_charges_as_over_the_bus(run, controller):
     ):
         assert np.abs(np.subtract(ours_K, theirs_K)).max() < 1e-7
     assert peaks.voltage_V == pytest.approx(summary.max_voltage_V, abs=1e-9)
+
+
+def test_cc_cv_ends_by_its_tail_current_when_the_charger_told_too_little():
+    """Told 0.5 of a cell that holds 0.985: counted charge would never get there."""
+    preset = load_preset("lin2014")
+    nominal = nominal_cell(preset)
+    cell = replace(preset.cell, ocv=replace(preset.cell.ocv, overfill_slope_V=15.0))
+    state = nominal.state._replace(soc=0.985)
+    true_cell = replace(nominal, cell=cell, state=state, plug_in_soc=0.5)
+    kind = DisturbanceKind.NONE
+    charge, _ = charge_in_c(preset, ControllerKind.CC_CV, kind, 600.0, true_cell)
+    settings = Settings(
+        preset,
+        ControllerKind.CC_CV,
+        seed=SEED,
+        disturbance=kind,
+        max_time_s=600.0,
+        true_cell=true_cell,
+    )
+    summary = run_both(settings).summary
+    assert (charge.outcome, summary.stop_reason) == ("complete", "complete")
+    assert charge.fields.periods == summary.steps
+    assert 0.99 < summary.final_soc <= 1.005

@@ -8,7 +8,7 @@ import numpy as np
 
 from bms.arrays import Array
 from bms.barrier import barrier_constants
-from bms.baselines.cc_cv import CUT_BACK_SPAN_K
+from bms.baselines.cc_cv import CUT_BACK_SPAN_K, REACHED_V, tail_current_A
 from bms.baselines.measured_cell import charging_voltage_V
 from bms.calibration import calibration_fields
 from bms.presets import Preset
@@ -188,6 +188,8 @@ def _baselines(preset: Preset) -> dict[str, float]:
         "a9_K_per_A2s2": constants.a9_K_per_A2s2,
         "a10_K_per_Ws2": constants.a10_K_per_Ws2,
         "charging_voltage_V": charging_voltage_V(preset),
+        "reached_V": charging_voltage_V(preset) - REACHED_V,
+        "tail_current_A": tail_current_A(preset),
         "cut_back_begin_K": limits.max_surface_temperature_K - CUT_BACK_SPAN_K,
         "cut_back_end_K": limits.max_surface_temperature_K,
     }

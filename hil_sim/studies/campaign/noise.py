@@ -65,10 +65,13 @@ def _bang_bang(
 
     def next_block(count: int) -> Array:
         nonlocal begin
-        steps = np.arange(begin, begin + count)
+        knots = np.empty((count, _CHANNELS))
+        for channel, (flips, sign) in enumerate(zip(changes, first)):
+            done, due = np.searchsorted(flips, [begin, begin + count - 1], side="right")
+            lengths = np.diff([0, *(flips[done:due] - begin), count])
+            signs = np.resize([1.0, -1.0], len(lengths)) * (sign if done % 2 == 0 else -sign)
+            knots[:, channel] = np.repeat(signs * amplitude[channel], lengths)
         begin += count
-        flips = [np.searchsorted(channel, steps, side="right") for channel in changes]
-        signs = np.where(np.stack(flips, axis=1) % 2 == 0, first, -first)
-        return np.asarray(signs * amplitude)
+        return knots
 
     return next_block

@@ -19,6 +19,8 @@ typedef struct {
     double a9_K_per_A2s2;
     double a10_K_per_Ws2;
     double charging_voltage_V;
+    double reached_V;      /* voltage that counts as the charging voltage */
+    double tail_current_A; /* strength at which a charge at constant voltage ends */
     double cut_back_begin_K;
     double cut_back_end_K;
 } baseline_constants_t;

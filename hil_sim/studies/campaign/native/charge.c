@@ -101,7 +101,7 @@ static link_answer_t ask_firmware(charge_t *charge, const double readings[LINK_R
 }
 
 /* Counts the charge and says whether the controller takes the cell for full. */
-static bool is_full(charge_t *charge, double reading_A)
+static bool is_full(charge_t *charge, double reading_A, double reading_V)
 {
     const charge_scenario_t *scenario = charge->scenario;
     if (charge->controller == CHARGE_S_CBF) {
@@ -112,7 +112,9 @@ static bool is_full(charge_t *charge, double reading_A)
     }
     const double share_per_A = scenario->period_s / scenario->baselines.capacity_As;
     charge->counted_soc -= reading_A * share_per_A;
-    return charge->counted_soc >= scenario->completion_soc;
+    const bool has_tailed_off = (reading_V >= scenario->baselines.reached_V) &&
+                                (-reading_A <= scenario->baselines.tail_current_A);
+    return has_tailed_off || (charge->counted_soc >= scenario->completion_soc);
 }
 
 static link_answer_t ask_baseline(charge_t *charge, const double readings[LINK_READINGS])
@@ -126,7 +128,7 @@ static link_answer_t ask_baseline(charge_t *charge, const double readings[LINK_R
         heard[i] = link_over_the_bus(&signals->readings[i], readings[i]);
     }
     link_answer_t answer = { true, 0.0, BMS_STANDBY };
-    if (charge->requested && is_full(charge, heard[0])) {
+    if (charge->requested && is_full(charge, heard[0], heard[1])) {
         answer.state = BMS_COMPLETE;
     } else if (charge->requested) {
         const double current_A =
