@@ -24,6 +24,8 @@ SOC_CELLS = 32
 TEMPERATURES = 12
 LONGEST_REST_S = 2.0
 """Time at rest after which the surface has told the core temperature."""
+CHARGE_WINDOW_S = 10.0
+"""Time in a charge over which the surface tells how hot the core is at least."""
 FULL_PERIODS = 10
 INNER_K = 0.02
 """By which the core is kept below its limit beyond what is derived: float32, and starts that are

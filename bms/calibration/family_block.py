@@ -133,6 +133,27 @@ def _rest(preset: Preset) -> dict[str, Any]:
         + per_gap * errors.coolant_K
         + slowness_s * noise.surface_K_per_s
         + periods * period_s * noise.core_K_per_s,
+        **_charge_window(preset),
+    }
+
+
+def _charge_window(preset: Preset) -> dict[str, Any]:
+    """How hot the core is at least, by the surface in a charge."""
+    ends = bounds.extremes(preset.cell, bounds.family_of(preset))
+    errors, period_s = reading_errors(preset), preset.timing.sampling_period_s
+    periods = max(2, round(bounds.CHARGE_WINDOW_S / period_s))
+    window_s = (periods - 1) * period_s
+    slowest_s = ends.core_resistance[1] * ends.surface_heat_capacity[1]
+    fastest_s = ends.core_resistance[0] * ends.surface_heat_capacity[0]
+    per_gap = ends.core_resistance[0] / ends.surface_resistance[1]
+    return {
+        "charge_periods": periods,
+        "least_per_surface_rise": fastest_s / window_s,
+        "most_per_surface_fall": slowest_s / window_s,
+        "least_per_coolant_gap": per_gap,
+        "charge_error_K": (1.0 + 2.0 * slowest_s / window_s + per_gap) * errors.surface_K
+        + per_gap * errors.coolant_K
+        + slowest_s * preset.uncertainty.surface_K_per_s,
     }
 
 

@@ -58,6 +58,11 @@ _DEVIATIONS = {
     "surface_deficit_K": 1.0,
 }
 
+_FAMILY_DEVIATIONS = {
+    # Beyond what a cell of the family can have, which contains resistance, polarisation and age.
+    "voltage_deviation_V": 0.05,
+}
+
 
 def plausibility_fields(preset: Preset) -> dict[str, Any]:
     """Content of the calibration's plausibility_t as nested mapping, in the units of its names.
@@ -92,4 +97,5 @@ def plausibility_fields(preset: Preset) -> dict[str, Any]:
         ]
     }
     believed = {name: {"low": low, "high": high} for name, (low, high) in ranges.items()}
-    return believed | _DEVIATIONS | errors
+    deviations = _DEVIATIONS | ({} if preset.cell.interval is None else _FAMILY_DEVIATIONS)
+    return believed | deviations | errors

@@ -145,9 +145,9 @@ def _resistance(preset: Preset, k: Any) -> Iterator[Relation]:
         yield Relation("drift of a branch", drift, bound.drift_ohm_per_s)
         ohm = interval.polarisation[1] * branch.resistance_ohm
         yield Relation("resistance of a branch", ohm, bound.resistance_ohm)
-        share = 1.0 - np.exp(-period_s / branch.time_constant_s)
-        yield Relation("a branch at its fastest", float(share), bound.fast)
-        yield Relation("a branch at its slowest", bound.slow, float(share))
+        way = -float(np.expm1(-period_s / branch.time_constant_s))
+        yield Relation("a branch at its fastest", way, bound.fast)
+        yield Relation("a branch at its slowest", bound.slow, way)
 
 
 def _ohm(cell: CellParameters, temperature_K: Any, soc: float) -> Any:

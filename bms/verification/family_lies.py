@@ -39,7 +39,11 @@ def worst_lies(preset: Preset, block: Any) -> Iterator[Lie]:
 
 
 def _voltage(preset: Preset, block: Any) -> Lie:
-    """Read low by all that the greatest resistance has above the least: heat is underrated."""
+    """Read low by all that the greatest resistance has above the least: heat is underrated.
+
+    Up to where the surface would say so itself: the core as it is at most, for the surface at which
+    the least core that it admits is at the limit.
+    """
     cell, interval = preset.cell, family_of(preset)
     k, deviation_V = block.family, block.plausibility.voltage_deviation_V
     strength_A = np.linspace(0.1, -preset.limits.reference_current_A, _POINTS)
@@ -48,9 +52,13 @@ def _voltage(preset: Preset, block: Any) -> Lie:
     lie_V = strength_A * (greatest_ohm - k.least_resistance_ohm) + spread_V
     lie_V = np.minimum(lie_V, strength_A * greatest_ohm + spread_V)
     unseen_W = np.minimum(strength_A * lie_V, strength_A**2 * greatest_ohm)
-    core_K = extremes(cell, interval).core_resistance[1] * unseen_W
-    hot_enough = core_K <= preset.limits.max_core_temperature_K - preset.initial.temperature_K
-    worst = int(np.argmax(np.where(hot_enough, core_K, 0.0)))
+    ends, start_K = extremes(cell, interval), preset.initial.temperature_K
+    most = ends.core_resistance[1] / ends.surface_resistance[0]
+    least = ends.core_resistance[0] / ends.surface_resistance[1]
+    gap_K = (preset.limits.max_core_temperature_K - start_K) / (1.0 + least)
+    seen_K = (most - least) * gap_K + k.charge_error_K
+    core_K = np.minimum(ends.core_resistance[1] * unseen_W, seen_K)
+    worst = int(np.argmax(core_K))
     return Lie(
         "voltage_V",
         -float(lie_V[worst]),

@@ -81,6 +81,12 @@ typedef struct {
     float per_surface_rise;
     float per_coolant_gap;
     float rest_error_K;
+    /* And in a charge how hot it is at least: with the least of both, a fall with the most. */
+    uint32_t charge_periods;
+    float least_per_surface_rise;
+    float most_per_surface_fall;
+    float least_per_coolant_gap;
+    float charge_error_K;
     /* Charger. */
     float supply_tolerance;
     float supply_share; /* of the way to the command that the slowest goes in a period */
@@ -105,6 +111,14 @@ typedef struct {
     bool is_charging;
 } family_reading_t;
 
+/* Surface and its gap to the coolant over some periods. */
+typedef struct {
+    uint32_t count;
+    float first_K;
+    float sum_K; /* of what is above the first */
+    float gap_K; /* sum */
+} family_window_t;
+
 typedef struct {
     soc_counter_t soc_low;
     soc_counter_t soc_high;
@@ -125,10 +139,8 @@ typedef struct {
     float surface_temperature_K;
     bool core_is_known;
     float core_room_K; /* from the hottest possible core to the limit */
-    uint32_t rest_count;
-    float rest_surface_K;
-    float rest_rise_K;
-    float rest_gap_K;
+    family_window_t rest;
+    family_window_t charge;
     uint32_t full_count;
 } family_t;
 

@@ -22,7 +22,8 @@ static void forget_core(family_t *family)
 {
     family->core_is_known = false;
     family->core_room_K = 0.0f;
-    family->rest_count = 0u;
+    family->rest.count = 0u;
+    family->charge.count = 0u;
     family->heat_W = 0.0f;
     family->surface_temperature_K = -FLT_MAX;
 }
@@ -198,38 +199,69 @@ static void follow_core(family_t *family, const family_constants_t *constants,
     family->core_is_known = family->core_is_known && numeric_is_finite(family->core_room_K);
 }
 
-/* Without current the surface's own balance tells the mean of the core over a time:
+static void add_to(family_window_t *window, const family_reading_t *reading)
+{
+    const float surface_K = reading->surface_temperature_K;
+    if (window->count == 0u) {
+        *window = (family_window_t){ .first_K = surface_K };
+    }
+    window->count++;
+    window->sum_K += surface_K - window->first_K;
+    window->gap_K += surface_K - reading->coolant_temperature_K;
+}
+
+/* The surface's own balance tells the mean of the core over a time:
  *   Tc - Ts = Rc Cs (Ts' - nu) + (Rc / Rs) (Ts - Tinf)
  * and a core without current is no hotter than its mean, unless the surface is hotter still. */
 static void look_at_rest(family_t *family, const family_constants_t *constants,
                          const rcbf_constants_t *cell, const family_reading_t *reading)
 {
+    family_window_t *window = &family->rest;
     const float surface_K = reading->surface_temperature_K;
-    if (family->rest_count == 0u) {
-        family->rest_surface_K = surface_K;
-        family->rest_rise_K = 0.0f;
-        family->rest_gap_K = 0.0f;
-    }
-    family->rest_rise_K += surface_K - family->rest_surface_K;
-    family->rest_gap_K += surface_K - reading->coolant_temperature_K;
-    family->rest_count++;
-    if (family->rest_count < constants->rest_periods) {
+    add_to(window, reading);
+    if (window->count < constants->rest_periods) {
         return;
     }
-    const float share = 1.0f / (float)family->rest_count;
-    const float rise_K = surface_K - family->rest_surface_K;
-    const float mean_K = family->rest_surface_K + share * family->rest_rise_K;
+    const float share = 1.0f / (float)window->count;
+    const float mean_K = window->first_K + share * window->sum_K;
     const float above_K =
-        larger(0.0f, larger(0.0f, rise_K) * constants->per_surface_rise +
-                         larger(0.0f, share * family->rest_gap_K) * constants->per_coolant_gap);
-    const float hottest_K = larger(surface_K, mean_K + above_K) + constants->rest_error_K;
+        larger(0.0f, surface_K - window->first_K) * constants->per_surface_rise +
+        larger(0.0f, share * window->gap_K) * constants->per_coolant_gap;
+    const float heated_K = (float)window->count * constants->heating_K_per_W * family->heat_W;
+    const float hottest_K =
+        larger(surface_K, mean_K + above_K) + constants->rest_error_K + larger(0.0f, heated_K);
     const float room_K = (cell->max_core_temperature_K.high_K - hottest_K) +
                          cell->max_core_temperature_K.low_K;
     if (!family->core_is_known || (room_K > family->core_room_K)) {
         family->core_room_K = room_K;
         family->core_is_known = numeric_is_finite(room_K);
     }
-    family->rest_count = 0u;
+    window->count = 0u;
+}
+
+/* A surface that says that the core is hotter than the measured heat can have made it contradicts the
+ * voltage or itself. The hotter one is believed. */
+static void look_in_charge(family_t *family, const family_constants_t *constants,
+                           const rcbf_constants_t *cell, const family_reading_t *reading)
+{
+    family_window_t *window = &family->charge;
+    add_to(window, reading);
+    if (window->count < constants->charge_periods) {
+        return;
+    }
+    const float share = 1.0f / (float)window->count;
+    const float rise_K = reading->surface_temperature_K - window->first_K;
+    const float per_rise = (rise_K > 0.0f) ? constants->least_per_surface_rise
+                                           : constants->most_per_surface_fall;
+    const float gap_K = share * window->gap_K;
+    const float least_K = window->first_K + share * window->sum_K + rise_K * per_rise +
+                          gap_K * constants->least_per_coolant_gap - constants->charge_error_K;
+    const float room_K = (cell->max_core_temperature_K.high_K - least_K) +
+                         cell->max_core_temperature_K.low_K;
+    if ((gap_K > 0.0f) && (room_K < family->core_room_K)) {
+        family->core_room_K = room_K;
+    }
+    window->count = 0u;
 }
 
 static bool is_at_rest(const family_constants_t *constants, const family_reading_t *reading)
@@ -264,7 +296,8 @@ static void look_for_full(family_t *family, const family_constants_t *constants,
 static void bridge(family_t *family, const family_constants_t *constants)
 {
     family->bridged++;
-    family->rest_count = 0u;
+    family->rest.count = 0u;
+    family->charge.count = 0u;
     if (family->bridged > MAX_BRIDGED) {
         forget_after_load(family, constants);
         return;
@@ -302,9 +335,11 @@ void family_observe(family_t *family, const family_constants_t *constants,
     if (is_at_rest(constants, reading)) {
         follow_core(family, constants, cell, reading);
         look_at_rest(family, constants, cell, reading);
+        family->charge.count = 0u;
     } else if (reading->is_charging) {
         follow_core(family, constants, cell, reading);
-        family->rest_count = 0u;
+        look_in_charge(family, constants, cell, reading);
+        family->rest.count = 0u;
     } else {
         forget_after_load(family, constants);
     }

@@ -179,12 +179,15 @@ bool family_constants_are_valid(const family_constants_t *k)
                                    k->disturbance_W,        k->disturbance_W_per_A,
                                    k->disturbance_W_per_A2, k->hold_W,
                                    k->per_surface_rise,     k->per_coolant_gap,
-                                   k->rest_error_K,         k->supply_tolerance,
+                                   k->rest_error_K,         k->least_per_surface_rise,
+                                   k->most_per_surface_fall, k->least_per_coolant_gap,
+                                   k->charge_error_K,       k->supply_tolerance,
                                    k->current_error_A,      k->voltage_error_V,
                                    k->surface_error_K };
     bool valid = (k->gain_W_per_K >= k->outflow_W_per_K) && (k->gain_W_per_K <= FLT_MAX) &&
                  (k->supply_tolerance < 1.0f) && is_share(k->supply_share) &&
-                 is_share(k->relaxation) && (k->rest_periods >= 1u) && (k->full_periods >= 1u);
+                 is_share(k->relaxation) && (k->rest_periods >= 1u) &&
+                 (k->charge_periods >= 1u) && (k->full_periods >= 1u);
     for (uint32_t i = 0u; i < sizeof positive / sizeof positive[0]; i++) {
         valid = valid && is_positive(positive[i]);
     }
