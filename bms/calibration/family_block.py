@@ -87,6 +87,7 @@ def family_fields(preset: Preset) -> dict[str, Any]:
         "voltage_error_V": bounds.voltage_error_V(preset),
         "surface_error_K": errors.surface_K,
         "hold_s": hold_s,
+        "period_s": period_s,
         "full_ocv_V": float(cell.ocv(preset.limits.completion_soc)),
         "full_periods": bounds.FULL_PERIODS,
         "map": _map_fields(preset),

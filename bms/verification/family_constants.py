@@ -143,8 +143,8 @@ def _resistance(preset: Preset, k: Any) -> Iterator[Relation]:
     for branch, bound in zip(cell.branches, k.branch):
         drift = interval.polarisation[1] * branch.resistance_ohm / branch.time_constant_s
         yield Relation("drift of a branch", drift, bound.drift_ohm_per_s)
-        ohm = interval.polarisation[1] * branch.resistance_ohm
-        yield Relation("resistance of a branch", ohm, bound.resistance_ohm)
+        branch_ohm = interval.polarisation[1] * branch.resistance_ohm
+        yield Relation("resistance of a branch", branch_ohm, bound.resistance_ohm)
         way = -float(np.expm1(-period_s / branch.time_constant_s))
         yield Relation("a branch at its fastest", way, bound.fast)
         yield Relation("a branch at its slowest", bound.slow, way)

@@ -238,6 +238,7 @@ def _claimed(
     family.soc_known = True
     for i in range(len(branches)):
         family.strong_A[i] = family.weak_A[i] = strengths_A[i]
+    family.polarisation_V = sum(trial.branches_V)
     family.supply_low_A = family.supply_high_A = -command_A
     for i in range(2):
         family.commands_A[i] = -command_A

@@ -90,6 +90,7 @@ typedef struct {
     /* Charger. */
     float supply_tolerance;
     float supply_share; /* of the way to the command that the slowest goes in a period */
+    float period_s;
     /* Readings. */
     float current_error_A;
     float voltage_error_V;
@@ -128,6 +129,7 @@ typedef struct {
     float strong_A[FAMILY_MAX_BRANCHES]; /* what flows in each branch's resistance, at most */
     float weak_A[FAMILY_MAX_BRANCHES];   /* and at least */
     float strongest_A;                   /* of the cell's current and those at most */
+    float polarisation_V;                /* of all branches together, at most */
     float rest_polarisation_V;
     float commands_A[2]; /* strengths, the last one first */
     float supply_low_A;

@@ -34,6 +34,7 @@ static void forget_after_load(family_t *family, const family_constants_t *consta
     forget_core(family);
     family->soc_known = false;
     family->rest_polarisation_V = constants->rest_polarisation_V;
+    /* What a load has left goes down as what was there at plug-in. */
     for (uint32_t i = 0u; i < FAMILY_MAX_BRANCHES; i++) {
         family->weak_A[i] = 0.0f;
     }
@@ -147,6 +148,35 @@ static void look_up(family_t *family, const family_constants_t *constants,
         larger(0.0f, reading->voltage_V - rcbf_open_circuit_voltage_V(cell, low) +
                          constants->ocv_error_V + constants->voltage_error_V +
                          2.0f * family->rest_polarisation_V);
+}
+
+/* The branches take up no more than this in a period, whatever they hold. */
+static float polarisation_rise_V(const family_t *family, const family_constants_t *constants,
+                                 float strength_A)
+{
+    float rise_V_per_s = 0.0f;
+    for (uint32_t i = 0u; i < constants->branches; i++) {
+        rise_V_per_s += constants->branch[i].drift_ohm_per_s *
+                        larger(0.0f, strength_A - family->weak_A[i]);
+    }
+    return constants->period_s * rise_V_per_s;
+}
+
+/* Nor is it more than they hold at their strongest current, or than the overpotential leaves beside
+ * the least ohmic drop. */
+static void follow_polarisation(family_t *family, const family_constants_t *constants)
+{
+    const float most_A = family->strength_A + constants->current_error_A;
+    const float least_A = larger(family->strength_A - constants->current_error_A, 0.0f);
+    float strong_V = 0.0f;
+    for (uint32_t i = 0u; i < constants->branches; i++) {
+        strong_V += constants->branch[i].resistance_ohm * family->strong_A[i];
+    }
+    const float risen_V =
+        family->polarisation_V + polarisation_rise_V(family, constants, most_A);
+    const float seen_V =
+        larger(0.0f, family->overpotential_V - constants->least_resistance_ohm * least_A);
+    family->polarisation_V = smaller(strong_V, smaller(risen_V, seen_V));
 }
 
 family_heat_t family_heat(const family_t *family, const family_constants_t *constants,
@@ -269,15 +299,6 @@ static bool is_at_rest(const family_constants_t *constants, const family_reading
     return numeric_abs(reading->current_A) <= 2.0f * constants->current_error_A;
 }
 
-static float polarisation_V(const family_t *family, const family_constants_t *constants)
-{
-    float sum_V = 0.0f;
-    for (uint32_t i = 0u; i < constants->branches; i++) {
-        sum_V += constants->branch[i].resistance_ohm * family->strong_A[i];
-    }
-    return sum_V;
-}
-
 /* What resistance and polarisation cannot explain of the voltage is open-circuit voltage. */
 static void look_for_full(family_t *family, const family_constants_t *constants,
                           const family_reading_t *reading)
@@ -286,7 +307,7 @@ static void look_for_full(family_t *family, const family_constants_t *constants,
     const float least_ocv_V =
         reading->voltage_V - constants->voltage_error_V - constants->ocv_error_V -
         family->rest_polarisation_V - heat.resistance_ohm * heat.at_most_A -
-        polarisation_V(family, constants);
+        family->polarisation_V;
     const bool is_full = reading->is_charging && (least_ocv_V >= constants->full_ocv_V);
     family->full_count = is_full ? (family->full_count + 1u) : 0u;
 }
@@ -309,6 +330,7 @@ static void bridge(family_t *family, const family_constants_t *constants)
         .polarisation_ohm = constants->polarisation_ohm,
     };
     soc_add(&family->soc_high, strength_A * constants->greatest_soc_per_A);
+    family->polarisation_V += polarisation_rise_V(family, constants, strength_A);
     follow_branches(family, constants, 0.0f, strength_A);
     family->strength_A = strength_A;
     family->core_room_K -=
@@ -331,6 +353,7 @@ void family_observe(family_t *family, const family_constants_t *constants,
     const float strength_A = larger(-reading->current_A, 0.0f);
     follow_charge(family, constants, strength_A);
     look_up(family, constants, cell, reading);
+    follow_polarisation(family, constants);
     look_for_full(family, constants, reading);
     if (is_at_rest(constants, reading)) {
         follow_core(family, constants, cell, reading);
@@ -378,6 +401,6 @@ bool family_voltage_is_plausible(const family_t *family, const family_constants_
                         heat.least_resistance_ohm * heat.at_least_A - spread_V;
     const float high_V = rcbf_open_circuit_voltage_V(cell, family->soc_high.soc) +
                          heat.resistance_ohm * heat.at_most_A +
-                         polarisation_V(family, constants) + spread_V;
+                         family->polarisation_V + spread_V;
     return (reading->voltage_V >= low_V) && (reading->voltage_V <= high_V);
 }
