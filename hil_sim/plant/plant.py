@@ -8,7 +8,7 @@ from bms.cell import Disturbance, integrate_step, polarisation_after_V, terminal
 from bms.presets import Preset
 from bms.presets.schema import Limits
 from hil_sim.plant.disturbances import Source, core_growth
-from hil_sim.plant.true_cell import TrueCell, nominal_cell
+from hil_sim.plant.true_cell import TrueCell, cooling_share, nominal_cell
 
 SUB_STEPS = 10
 
@@ -45,7 +45,7 @@ class Extremes:
 
 
 class Plant:
-    """One cell with its coolant at constant cooling power, driven by a current (A).
+    """One cell with its coolant and its cooling power, driven by a current (A).
 
     `current_A` (negative while charging) is set from outside and held over a control period; the
     disturbance has a knot at every sub-step.
@@ -62,7 +62,8 @@ class Plant:
         self._step_s = preset.timing.sampling_period_s / SUB_STEPS
         self._source = disturbance
         self._knot = next(disturbance)
-        self.cooling_power_W = true_cell.cooling_power_W
+        self._full_cooling_W = true_cell.cooling_power_W
+        self._coolant_floor_K = true_cell.coolant_floor_K
         self.current_A = 0.0
         self.state = true_cell.state
         self.polarisation_V = true_cell.polarisation_V
@@ -72,6 +73,16 @@ class Plant:
             self.voltage_V,
             self.state.soc,
         )
+
+    @property
+    def cooling_power_W(self) -> float:
+        """Cooling power in W of this control period; what is set is the cooler's full power."""
+        share = cooling_share(self.state.coolant_temperature_K, self._coolant_floor_K)
+        return self._full_cooling_W * share
+
+    @cooling_power_W.setter
+    def cooling_power_W(self, full_W: float) -> None:
+        self._full_cooling_W = full_W
 
     @property
     def voltage_V(self) -> float:

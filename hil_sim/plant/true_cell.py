@@ -9,6 +9,9 @@ from bms.presets import Preset
 from bms.presets.schema import Initial, Sensors
 from hil_sim.plant.sensors import Readings
 
+COOLING_BAND_K = 1.0
+"""A cooler's thermostat is proportional, from full power down to none."""
+
 
 @dataclass(frozen=True)
 class TrueCell:
@@ -27,6 +30,8 @@ class TrueCell:
     biases: Readings
     supply_tolerance: float = 0.0
     supply_lag_s: float = 0.0
+    coolant_floor_K: float = 0.0
+    """The cooling fades out over COOLING_BAND_K above this temperature of the coolant."""
 
     def sensors(self, sensors: Sensors) -> Sensors:
         """The preset's sensors with the biases of this cell's."""
@@ -53,3 +58,8 @@ def nominal_cell(preset: Preset, start: Initial | None = None) -> TrueCell:
         polarisation_V=at_rest_V(preset.cell),
         biases=Readings(*(getattr(preset.sensors, name).bias for name in Readings._fields)),
     )
+
+
+def cooling_share(coolant_temperature_K: float, floor_K: float) -> float:
+    """Share of its power that a cooler gives at a coolant temperature in K, 0..1."""
+    return min(max((coolant_temperature_K - floor_K) / COOLING_BAND_K, 0.0), 1.0)

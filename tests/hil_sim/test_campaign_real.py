@@ -89,9 +89,12 @@ def test_the_state_at_plug_in_is_off_by_no_more_than_the_preset_says(draws):
             <= state.coolant_temperature_K
             <= box.coolant_temperature_K[1]
         )
-        assert 0.0 <= cell.cooling_power_W <= box.cooling_power_W[1]
+        assert 0.05 < cell.cooling_power_W <= box.cooling_power_W[1]
+        assert box.coolant_temperature_K[0] < cell.coolant_floor_K
+        assert cell.coolant_floor_K <= max(min(state.coolant_temperature_K - 1.0, 303.0), 267.0)
         assert abs(sum(cell.polarisation_V)) <= plug_in.polarisation_V + 1e-12
-        assert len(cell.polarisation_V) == len(cell.cell.branches)
+        for branch, voltage_V in zip(cell.cell.branches, cell.polarisation_V, strict=True):
+            assert abs(voltage_V) <= 23.0 * branch.resistance_ohm + 1e-12
         assert abs(cell.supply_tolerance) <= PRESET.supply.tolerance
         assert 0.0 <= cell.supply_lag_s <= PRESET.supply.lag_s
     assert min(errors) == pytest.approx(-plug_in.soc_error) and max(errors) == pytest.approx(

@@ -16,7 +16,7 @@ from bms.presets.schema import Sensor
 from codegen.can_database import load_database
 from hil_sim.plant.charger import lag_share
 from hil_sim.plant.sensors import Readings
-from hil_sim.plant.true_cell import TrueCell
+from hil_sim.plant.true_cell import COOLING_BAND_K, TrueCell
 from hil_sim.run.charge import OFF_PERIODS, READY_PERIODS, STARTING_PERIODS
 from hil_sim.studies.campaign._runner import ffi, lib
 from hil_sim.studies.campaign.native_cell import cell_fields
@@ -58,6 +58,7 @@ class Scenario:
                 "max_time_s": settings.max_time_s,
                 "reference_current_A": preset.limits.reference_current_A,
                 "completion_soc": preset.limits.completion_soc,
+                "cooling_band_K": COOLING_BAND_K,
                 "noise_cutoff": Sensor.NOISE_CUTOFF,
                 "off_periods": OFF_PERIODS,
                 "ready_periods": READY_PERIODS,
@@ -91,7 +92,8 @@ class CampaignCharge:
                 "scenario": scenario.fields,
                 "controller": CONTROLLERS[controller],
                 "cell": cell_fields(true_cell.cell, period_s / SUB_STEPS),
-                "cooling_power_W": true_cell.cooling_power_W,
+                "full_cooling_W": true_cell.cooling_power_W,
+                "coolant_floor_K": true_cell.coolant_floor_K,
                 "plug_in_soc": true_cell.plug_in_soc,
                 "bias": tuple(true_cell.biases),
                 "supply_gain": 1.0 + true_cell.supply_tolerance,

@@ -13,7 +13,7 @@ from bms.errors import InputError
 from bms.presets import Preset
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.plant.sensors import Readings
-from hil_sim.plant.true_cell import TrueCell
+from hil_sim.plant.true_cell import COOLING_BAND_K, TrueCell
 from hil_sim.studies.campaign.native_cell import thermal_matrix_per_s
 
 EMPTY_SOC, HALF_FULL_SOC = (0.0, 0.5), (0.5, 0.9)
@@ -21,6 +21,10 @@ HALF_FULL_SHARE = 0.25
 """What the charger says at plug-in, and the share of the runs that begin with the latter."""
 HOT_CORE_SHARE = 1.0 / 3.0
 COLDEST_ABOVE_BOX_K, HOTTEST_BELOW_LIMIT_K = 2.0, 4.0
+LEAST_COOLING = 2.0
+"""Times the heat of the disturbance."""
+FLOOR_BELOW_LIMIT_K = 20.0
+"""A cooler's thermostat is set at least this far below the limit of the core."""
 END_SHARE, VERTEX_SHARE = 0.25, 0.125
 """Each quantity is at an end of its interval in a quarter of the runs; in an eighth, all are."""
 
@@ -56,7 +60,7 @@ def draw_real(preset: Preset, max_time_s: float, rng: np.random.Generator) -> Re
     kind = _KINDS[int(rng.integers(len(_KINDS)))]
     told_soc, true_soc = draws.socs()
     for _ in range(_ATTEMPTS):
-        state, cooling_W = draws.start(true_soc)
+        state, cooling_W = draws.start(cell, true_soc)
         if _keeps_limits_at_rest(preset, cell, state, cooling_W, max_time_s):
             break
     else:
@@ -76,6 +80,7 @@ def draw_real(preset: Preset, max_time_s: float, rng: np.random.Generator) -> Re
             biases=draws.biases(),
             supply_tolerance=draws.pick(-tolerance, tolerance),
             supply_lag_s=draws.pick(0.0, preset.supply.lag_s),
+            coolant_floor_K=draws.coolant_floor_K(state.coolant_temperature_K),
         ),
         disturbance=kind,
     )
@@ -117,8 +122,11 @@ class _Draws:
         error = self._preset.plug_in.soc_error
         return told, min(max(told + self.pick(-error, error), 0.0), 1.0)
 
-    def start(self, soc: float) -> tuple[CellState, float]:
-        """State with temperatures, and the cooling power, which is never less than 0."""
+    def start(self, cell: CellParameters, soc: float) -> tuple[CellState, float]:
+        """State with temperatures, and a cooling power that is more than the disturbance heats.
+
+        With less of it a warm cell gets ever hotter at 0 A, whatever the charge control does.
+        """
         preset, box = self._preset, self._preset.operating_box
         limits, plug_in = preset.limits, preset.plug_in
         limit_K = min(limits.max_core_temperature_K, limits.max_surface_temperature_K)
@@ -133,22 +141,47 @@ class _Draws:
         excess_K = self.pick(0.0, min(plug_in.core_excess_K, limit_K - surface_K))
         is_hot = self._rng.uniform() < HOT_CORE_SHARE
         core_K = min(surface_K + excess_K, limit_K) if is_hot else surface_K
-        low_W, high_W = box.cooling_power_W
-        return CellState(soc, core_K, surface_K, coolant_K), self.pick(max(low_W, 0.0), high_W)
+        least_W = LEAST_COOLING * _disturbance_W(preset, cell)
+        cooling_W = self.pick(least_W, box.cooling_power_W[1])
+        return CellState(soc, core_K, surface_K, coolant_K), cooling_W
+
+    def coolant_floor_K(self, coolant_temperature_K: float) -> float:
+        """Temperature down to which the coolant is cooled, below that at plug-in."""
+        coldest_K = self._preset.operating_box.coolant_temperature_K[0] + COLDEST_ABOVE_BOX_K
+        warmest_K = self._preset.limits.max_core_temperature_K - FLOOR_BELOW_LIMIT_K
+        highest_K = min(coolant_temperature_K - COOLING_BAND_K, warmest_K)
+        return self.pick(coldest_K, max(highest_K, coldest_K))
 
     def polarisation(self, cell: CellParameters) -> Polarisation:
-        """Voltages of the branches; together they are within the preset's bound."""
+        """Voltages of the branches, which together are within the preset's bound.
+
+        None is more than what the strongest current can bring about in it.
+        """
         if not cell.branches:
             return ()
         bound_V = self._preset.plug_in.polarisation_V
         total_V = self.pick(-bound_V, bound_V)
         shares = self._rng.dirichlet(np.ones(len(cell.branches))).tolist()
-        return tuple(total_V * share for share in shares)
+        strongest_A = -self._preset.limits.reference_current_A
+        largest_V = [branch.resistance_ohm * strongest_A for branch in cell.branches]
+        return tuple(
+            min(max(total_V * share, -most_V), most_V) for share, most_V in zip(shares, largest_V)
+        )
 
     def biases(self) -> Readings:
         """A constant error of each sensor, within what its bound leaves beside the noise."""
         bounds = (abs(getattr(self._preset.sensors, name).bias) for name in Readings._fields)
         return Readings(*(self.pick(-bound, bound) for bound in bounds))
+
+
+def _disturbance_W(preset: Preset, cell: CellParameters) -> float:
+    """Heat of the disturbance at its bounds in a cell without a current, in W."""
+    bounds = preset.uncertainty
+    return (
+        cell.core_heat_capacity_J_per_K * bounds.core_K_per_s
+        + cell.surface_heat_capacity_J_per_K * bounds.surface_K_per_s
+        + cell.coolant_heat_capacity_J_per_K * bounds.coolant_K_per_s
+    )
 
 
 def _keeps_limits_at_rest(

@@ -268,6 +268,10 @@ static void run_period(charge_t *charge, const double *normals, const double *kn
 {
     const charge_scenario_t *scenario = charge->scenario;
     double readings[LINK_READINGS];
+    charge->cooling_power_W =
+        charge->full_cooling_W *
+        within((charge->memory.state.coolant - charge->coolant_floor_K) / scenario->cooling_band_K,
+               0.0, 1.0);
     measure(charge, normals, readings);
     const link_answer_t answer = (charge->controller == CHARGE_KAN_RCBF)
                                      ? ask_firmware(charge, readings)

@@ -39,6 +39,7 @@ typedef struct {
     double max_time_s;
     double reference_current_A;
     double completion_soc;
+    double cooling_band_K;
     double noise_cutoff; /* of the standard normal numbers */
     uint32_t off_periods;   /* before the charge is requested */
     uint32_t ready_periods; /* after which an ECU that is not ready is given up */
@@ -75,7 +76,8 @@ typedef struct {
     const charge_scenario_t *scenario;
     charge_controller_t controller;
     cell_t cell;
-    double cooling_power_W;
+    double full_cooling_W;        /* of the cooler */
+    double coolant_floor_K;       /* over the band above it the cooling fades out */
     double plug_in_soc;           /* as the charger tells it */
     double bias[LINK_READINGS];   /* of the sensors */
     double supply_gain;           /* current supplied over the one commanded */
@@ -86,6 +88,7 @@ typedef struct {
     double current_A;
     double lagged_A; /* current before the charger's gain */
     double command_A;
+    double cooling_power_W; /* in the present period */
     charge_differences_t differences;
     charge_outcome_t outcome;
     uint32_t periods;
