@@ -27,6 +27,7 @@ from hil_sim.commands import options
 from hil_sim.commands.campaign_output import print_classes, print_family
 from hil_sim.run.workforce import Workforce, dask_workforce, local_workforce
 from hil_sim.studies.campaign.histogram import save_histograms
+from hil_sim.studies.campaign.nominal import NominalPart
 from hil_sim.studies.campaign.real_summary import family_is_safe, summarise_family
 from hil_sim.studies.campaign.run import run_campaign
 from hil_sim.studies.campaign.settings import MAX_TIME_S, CampaignSettings, CellFamily
@@ -48,6 +49,13 @@ def campaign(
             "all that the preset's [cell.interval], plug-in errors and supply admit.",
         ),
     ] = CellFamily.PUBLISHED,
+    nominal_part: Annotated[
+        NominalPart | None,
+        typer.Option(
+            "--nominal-part",
+            help="Let the firmware take this part of a real family for nominal: what it is for.",
+        ),
+    ] = None,
     max_time_s: Annotated[
         float | None,
         typer.Option(
@@ -85,6 +93,7 @@ def campaign(
         seed=seed,
         max_time_s=MAX_TIME_S[family] if max_time_s is None else max_time_s,
         family=family,
+        nominal_part=nominal_part,
     )
     is_real = family is CellFamily.REAL
     workforce = local_workforce(jobs) if scheduler is None else dask_workforce(scheduler)

@@ -20,6 +20,7 @@ from hil_sim.plant.true_cell import COOLING_BAND_K, TrueCell
 from hil_sim.run.charge import OFF_PERIODS, READY_PERIODS, STARTING_PERIODS
 from hil_sim.studies.campaign._runner import ffi, lib
 from hil_sim.studies.campaign.native_cell import cell_fields
+from hil_sim.studies.campaign.nominal import nominal_fields
 from hil_sim.studies.campaign.settings import CampaignSettings
 
 SUB_STEPS: int = lib.CHARGE_SUB_STEPS
@@ -47,10 +48,10 @@ class Scenario:
         """Raises InputError or ModelMismatchError as bms.tables.calibration_fields does."""
         preset = settings.preset
         self.preset = preset
-        self.calibration = ffi.new(
-            "bms_calibration_t *",
-            calibration_fields(preset, settings.model, settings.firmware_changes),
-        )
+        fields = calibration_fields(preset, settings.model, settings.firmware_changes)
+        if settings.nominal_part is not None:
+            fields["family"] = nominal_fields(preset, settings.nominal_part)
+        self.calibration = ffi.new("bms_calibration_t *", fields)
         self.fields = ffi.new(
             "charge_scenario_t *",
             {

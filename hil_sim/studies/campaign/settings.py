@@ -12,6 +12,7 @@ from typing import Any
 from bms.errors import InputError
 from bms.model.model_file import KanModel
 from bms.presets import Preset
+from hil_sim.studies.campaign.nominal import NominalPart
 
 CHUNK_RUNS = 20
 """Runs that a worker does in one piece and that are stored together; about a second of work."""
@@ -44,6 +45,8 @@ class CampaignSettings:
     max_time_s: float = 3600.0
     firmware_changes: Mapping[str, float] = field(default_factory=dict)
     family: CellFamily = CellFamily.PUBLISHED
+    nominal_part: NominalPart | None = None
+    """Part of the family that the firmware takes for nominal, though the cells are not."""
 
     def __post_init__(self) -> None:
         if self.runs < 1:
@@ -53,6 +56,8 @@ class CampaignSettings:
                 f"preset '{self.preset.name}': has no [cell.interval], so there is no family to "
                 "draw from; leave out --family real or choose a preset with one"
             )
+        if self.nominal_part is not None and self.family is not CellFamily.REAL:
+            raise InputError("--nominal-part: only --family real has parts; add it")
 
     def identity(self) -> dict[str, Any]:
         """Everything that the results depend on, as plain JSON; stored beside them."""
@@ -65,6 +70,7 @@ class CampaignSettings:
             "max_time_s": self.max_time_s,
             "firmware_changes": dict(self.firmware_changes),
             "family": self.family.value,
+            "nominal_part": None if self.nominal_part is None else self.nominal_part.value,
         }
 
     @property
