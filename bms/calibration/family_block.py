@@ -86,6 +86,7 @@ def family_fields(preset: Preset) -> dict[str, Any]:
         "current_error_A": bounds.current_error_A(preset),
         "voltage_error_V": bounds.voltage_error_V(preset),
         "surface_error_K": errors.surface_K,
+        "coolant_error_K": errors.coolant_K,
         "hold_s": hold_s,
         "period_s": period_s,
         "full_ocv_V": float(cell.ocv(preset.limits.completion_soc)),

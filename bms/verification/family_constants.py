@@ -269,6 +269,7 @@ def _readings(preset: Preset, k: Any) -> Iterator[Relation]:
         k.voltage_error_V,
     )
     yield Relation("error of the surface", errors.surface_K * (1.0 - 1e-6), k.surface_error_K)
+    yield Relation("error of the coolant", errors.coolant_K * (1.0 - 1e-6), k.coolant_error_K)
     yield Relation("tolerance of the charger", preset.supply.tolerance - 1e-7, k.supply_tolerance)
 
 

@@ -95,6 +95,7 @@ typedef struct {
     float current_error_A;
     float voltage_error_V;
     float surface_error_K;
+    float coolant_error_K;
     float hold_s;
     float full_ocv_V; /* open-circuit voltage of the least full cell that is full enough */
     uint32_t full_periods;

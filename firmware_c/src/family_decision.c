@@ -150,8 +150,12 @@ rcbf_decision_t family_decide(const family_t *family, const family_constants_t *
         decision.active = RCBF_CORE_UNKNOWN;
     }
     const core_condition_t core = core_condition(family, constants, cell, reading);
-    if ((strength_A >= 0.0f) && !(core.room_K >= 0.0f)) {
-        /* A core that may be too hot waits, though it would cool down with a little current too. */
+    const float coolant_room_K =
+        (cell->max_core_temperature_K.high_K - reading->coolant_temperature_K) -
+        constants->coolant_error_K - constants->inner_K;
+    if ((strength_A >= 0.0f) && !((core.room_K >= 0.0f) && (coolant_room_K >= 0.0f))) {
+        /* A core that may be too hot waits, though it would cool down with a little current too;
+         * beside a coolant that is too hot it would not. */
         strength_A = -1.0f;
         decision.active = RCBF_CORE;
     }

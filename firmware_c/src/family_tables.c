@@ -183,7 +183,7 @@ bool family_constants_are_valid(const family_constants_t *k)
                                    k->most_per_surface_fall, k->least_per_coolant_gap,
                                    k->charge_error_K,       k->supply_tolerance,
                                    k->current_error_A,      k->voltage_error_V,
-                                   k->surface_error_K };
+                                   k->surface_error_K,      k->coolant_error_K };
     bool valid = (k->gain_W_per_K >= k->outflow_W_per_K) && (k->gain_W_per_K <= FLT_MAX) &&
                  (k->supply_tolerance < 1.0f) && is_share(k->supply_share) &&
                  is_share(k->relaxation) && (k->rest_periods >= 1u) &&
