@@ -79,7 +79,7 @@ def family_fields(preset: Preset) -> dict[str, Any]:
         "disturbance_W_per_A": slowest * noise.core_K_per_As,
         "disturbance_W_per_A2": slowest * noise.core_K_per_A2s,
         "hold_W": outflow_W_per_K * hold_s * bounds.surface_rise_K_per_s(preset),
-        "estimate_error_K": LARGEST,
+        "estimate_error_K": preset.gains.estimate_error_K or LARGEST,
         **_rest(preset),
         "supply_tolerance": supply.tolerance,
         "supply_share": bounds.exponential_share(period_s, supply.lag_s),

@@ -53,6 +53,9 @@ class Gains:
     alpha4_per_s: Positive
     alpha2_per_s: Positive | None = None
     surface_condition: Literal["paper", "worst-case"] = "paper"
+    estimate_error_K: Positive | None = None
+    """Error of the estimate that somebody vouches for, for every cell of a family; without one a
+    family relies on its observer alone."""
 
     def __post_init__(self) -> None:
         if self.alpha4_per_s**2 < 4.0 * self.alpha3_per_s2:

@@ -171,7 +171,8 @@ bool family_is_full(const family_t *family, const family_constants_t *constants,
 
 /* Whether current flows into a cell whose core may be above its limit by more than an overshoot. */
 bool family_is_too_hot(const family_t *family, const family_constants_t *constants,
-                       float current_A, float overshoot_K);
+                       const rcbf_constants_t *cell, const family_reading_t *reading,
+                       float overshoot_K);
 
 /* Whether the measured current can be what a charger of the family makes of the commands, to
  * within a deviation. */

@@ -139,8 +139,9 @@ static bool core_is_too_hot(const bms_t *bms)
     if (has_family(bms)) {
         /* A cell that comes hot from a drive waits at 0 A; one that is charged all the same does
          * not do what it is told. */
+        const family_reading_t reading = reading_of(bms);
         return is_charging(bms) &&
-               family_is_too_hot(&bms->family, &calibration->family, bms->measurement.current_A,
+               family_is_too_hot(&bms->family, &calibration->family, &calibration->rcbf, &reading,
                                  overshoot_K);
     }
     const rcbf_constants_t *cell = &calibration->rcbf;

@@ -73,11 +73,7 @@ static core_condition_t core_condition(const family_t *family, const family_cons
     const float low_K = cell->max_core_temperature_K.low_K;
     const float surface_room_K =
         (limit_K - reading->surface_temperature_K) + low_K - constants->surface_error_K;
-    const float estimated_room_K =
-        (limit_K - reading->estimated_core_K) + low_K - constants->estimate_error_K;
-    /* An estimate that is no number leaves what the observer knows. */
-    const float room_K =
-        (estimated_room_K > family->core_room_K) ? estimated_room_K : family->core_room_K;
+    const float room_K = family_core_room_K(family, constants, cell, reading);
     return (core_condition_t){
         .room_K = room_K,
         .outflow_W = constants->outflow_W_per_K * (surface_room_K - room_K) +

@@ -375,11 +375,22 @@ bool family_is_full(const family_t *family, const family_constants_t *constants,
            (family->full_count >= constants->full_periods);
 }
 
-bool family_is_too_hot(const family_t *family, const family_constants_t *constants,
-                       float current_A, float overshoot_K)
+float family_core_room_K(const family_t *family, const family_constants_t *constants,
+                         const rcbf_constants_t *cell, const family_reading_t *reading)
 {
-    return family->core_is_known && (family->core_room_K < -overshoot_K) &&
-           (-current_A > 2.0f * constants->current_error_A);
+    const float estimated_room_K =
+        (cell->max_core_temperature_K.high_K - reading->estimated_core_K) +
+        cell->max_core_temperature_K.low_K - constants->estimate_error_K;
+    /* An estimate that is no number leaves what the observer knows. */
+    return (estimated_room_K > family->core_room_K) ? estimated_room_K : family->core_room_K;
+}
+
+bool family_is_too_hot(const family_t *family, const family_constants_t *constants,
+                       const rcbf_constants_t *cell, const family_reading_t *reading,
+                       float overshoot_K)
+{
+    return family->core_is_known && !is_at_rest(constants, reading) &&
+           (family_core_room_K(family, constants, cell, reading) < -overshoot_K);
 }
 
 bool family_supply_is_plausible(const family_t *family, const family_constants_t *constants,

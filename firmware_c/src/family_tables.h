@@ -29,6 +29,10 @@ typedef struct {
 family_heat_t family_heat(const family_t *family, const family_constants_t *constants,
                           const family_reading_t *reading);
 
+/* From the hottest core that is possible, by observer or estimate, to the limit. */
+float family_core_room_K(const family_t *family, const family_constants_t *constants,
+                         const rcbf_constants_t *cell, const family_reading_t *reading);
+
 float family_measured_heat_W(const family_heat_t *heat, float strength_A);
 float family_assumed_heat_W(const family_heat_t *heat, float strength_A);
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -69,7 +70,7 @@ def _summed_up(preset: Preset, plant: str, start_K: float, result: RunResult) ->
         surface_over_K=summary.max_surface_temperature_K - limits.max_surface_temperature_K,
         voltage_over_V=summary.max_voltage_V - limits.max_voltage_V,
         stops=sum(
-            first < -_FLOWING_A and second == 0.0 for first, second in zip(before, before[1:])
+            first < -_FLOWING_A and second == 0.0 for first, second in itertools.pairwise(before)
         ),
         min_anode_potential_V=summary.min_anode_potential_V,
     )
