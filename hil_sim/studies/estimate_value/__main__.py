@@ -18,8 +18,8 @@ from bms.model.model_file import load_shipped_model
 from bms.presets import Preset, load_preset
 from hil_sim.run.session import run_sil
 from hil_sim.run.settings import Settings
-from hil_sim.studies.campaign.settings import MAX_TIME_S, CampaignSettings, CellFamily
 from hil_sim.studies.campaign.rows import header
+from hil_sim.studies.campaign.settings import MAX_TIME_S, CampaignSettings, CellFamily
 from hil_sim.studies.campaign.worker import run_chunk
 
 RUNS = 400
