@@ -17,6 +17,11 @@ def preset_names() -> list[str]:
     return sorted(path.stem for path in _FOLDER.glob("*.toml"))
 
 
+def one_cell_preset_names() -> list[str]:
+    """Names of the shipped presets that describe one cell, not a family; sorted."""
+    return [name for name in preset_names() if load_preset(name).cell.interval is None]
+
+
 def preset_path(name_or_path: str | Path) -> Path:
     """File of a preset, by shipped name or by path of a TOML file.
 

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from bms.barrier import barrier_constants
 from bms.barrier.constraints import left_hand_sides
 from bms.cell import CellState
-from bms.presets import load_preset, preset_names
+from bms.presets import load_preset, one_cell_preset_names
 from bms.presets.schema import Gains
 
 RC, CC, RS, CS, CINF, R0, E, CBAT = sp.symbols("Rc Cc Rs Cs Cinf R0 E Cbat", positive=True)
@@ -136,7 +136,7 @@ def random_cell(draw_from):
 
 def cells():
     """Both presets, and random cells with the first preset's limits and gains."""
-    shipped = [load_preset(name) for name in preset_names()]
+    shipped = [load_preset(name) for name in one_cell_preset_names()]
     random = np.random.default_rng(6)
     gains = Gains(alpha1_per_s=0.02, alpha2_per_s=0.03, alpha3_per_s2=0.08, alpha4_per_s=0.7)
     other = replace(shipped[0], gains=gains)
@@ -205,7 +205,7 @@ def worst_sides(cell, preset, state, cooling_W, current_A, error_bound_K):
     seed=st.integers(0, 2**32 - 1),
     current_A=st.floats(-25.0, 0.0),
     error_bound_K=st.floats(0.0, 2.0),
-    name=st.sampled_from(preset_names()),
+    name=st.sampled_from(one_cell_preset_names()),
 )
 def test_left_hand_sides_are_the_worst_case_over_errors_and_disturbances(
     seed, current_A, error_bound_K, name
@@ -237,7 +237,7 @@ def _numeric_sides():
     current_A=st.floats(-25.0, 0.0),
     temperatures_K=st.tuples(*[st.floats(270.0, 330.0)] * 3),
     cooling_W=st.floats(0.0, 5.0),
-    name=st.sampled_from(preset_names()),
+    name=st.sampled_from(one_cell_preset_names()),
 )
 def test_temperature_differences_give_the_printed_sum(current_A, temperatures_K, cooling_W, name):
     preset = load_preset(name)
@@ -254,7 +254,7 @@ def test_temperature_differences_give_the_printed_sum(current_A, temperatures_K,
 
 
 def test_arrays_of_cells_give_what_each_gives_alone():
-    both = [load_preset(name) for name in preset_names()]
+    both = [load_preset(name) for name in one_cell_preset_names()]
     names = ("core_resistance_K_per_W", "surface_heat_capacity_J_per_K", "ohmic_resistance_ohm")
     stacked = {name: np.array([getattr(preset.cell, name) for preset in both]) for name in names}
     first = both[0]
@@ -276,7 +276,7 @@ PRINTED_CONSTANTS = {
 
 
 @pytest.mark.parametrize("slip", PRINTED_CONSTANTS)
-@pytest.mark.parametrize("preset_name", preset_names())
+@pytest.mark.parametrize("preset_name", one_cell_preset_names())
 def test_a_constant_as_the_paper_prints_it_does_not_pass(slip, preset_name):
     name, confused = PRINTED_CONSTANTS[slip]
     preset = load_preset(preset_name)
@@ -302,7 +302,7 @@ PRINTED_SIDES = {
 
 
 @pytest.mark.parametrize("slip", PRINTED_SIDES)
-@pytest.mark.parametrize("preset_name", preset_names())
+@pytest.mark.parametrize("preset_name", one_cell_preset_names())
 def test_a_constraint_as_the_paper_prints_it_claims_more_than_holds(slip, preset_name):
     index, sign, excess = PRINTED_SIDES[slip]
     preset = load_preset(preset_name)

@@ -22,7 +22,7 @@ from bms.barrier.machinery import (
 from bms.cell import CellState, Disturbance, integrate_step
 from bms.errors import InputError
 from bms.model.pair import load_pair
-from bms.presets import load_preset, preset_names
+from bms.presets import load_preset, one_cell_preset_names
 from bms.verification.conditions import decided_conditions, firmware_constants
 
 CELLS = 2
@@ -36,7 +36,7 @@ def derived() -> Derivation:
 def random_presets():
     """The shipped presets and cells drawn around them, both signs of the entropic coefficient."""
     random = np.random.default_rng(3)
-    for name in preset_names():
+    for name in one_cell_preset_names():
         preset = load_preset(name)
         yield preset
         for _ in range(CELLS):
@@ -145,7 +145,7 @@ def test_error_margins_are_the_absolute_slopes_over_the_estimate(preset, current
         assert value == pytest.approx(margin, rel=1e-9, abs=1e-15)
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", one_cell_preset_names())
 def test_the_firmwares_own_constants_are_those_that_the_theorem_yields(name):
     preset, model = load_pair(name, None)
     constants = firmware_constants(preset, model)
@@ -166,7 +166,7 @@ def test_the_firmwares_own_constants_are_those_that_the_theorem_yields(name):
         assert decided.error_bound_K == np.float32(model.error_bound_K)
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", one_cell_preset_names())
 def test_the_conditions_are_the_derivatives_along_simulated_trajectories(name):
     preset, d = load_preset(name), derived()
     s, step_s = d.symbols, 0.01

@@ -16,7 +16,7 @@ from bms.barrier.readings import soc_error_bound
 from bms.barrier.rounding import ROUNDINGS, UNIT, rounding_allowances
 from bms.bus_signals import BusQuantisation
 from bms.cell import CellState, Disturbance, integrate_step, rates, terminal_voltage_V
-from bms.presets import load_preset, preset_names
+from bms.presets import load_preset, one_cell_preset_names
 from bms.presets.schema import Uncertainty
 
 RUNS = 60
@@ -33,7 +33,7 @@ WEIGHTS = (
 )
 
 
-@pytest.fixture(params=preset_names())
+@pytest.fixture(params=one_cell_preset_names())
 def preset(request):
     return load_preset(request.param)
 

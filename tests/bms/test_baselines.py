@@ -19,9 +19,9 @@ from bms.baselines.cc_cv import CutBack
 from bms.baselines.multi_stage import STAGES
 from bms.cell import CellState, rates, terminal_voltage_V
 from bms.decision import Observation
-from bms.presets import load_preset, preset_names
+from bms.presets import load_preset, one_cell_preset_names
 
-PRESETS = {name: load_preset(name) for name in preset_names()}
+PRESETS = {name: load_preset(name) for name in one_cell_preset_names()}
 PRESET = PRESETS["paper_calibrated"]
 LIMITS = PRESET.limits
 FULL_A = LIMITS.reference_current_A

@@ -11,7 +11,7 @@ from bms.bounds.derive import SEARCH_SPREAD_K, bounds_for_recording, error_bound
 from bms.data.datasets import split_by_time
 from bms.data.measurements import read_measurements
 from bms.model.model_file import load_model, load_shipped_model, save_model, shipped_model_path
-from bms.presets import preset_names
+from bms.presets import one_cell_preset_names
 from tests.bms.kan_samples import write_recording
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -136,7 +136,7 @@ def test_shipped_default_is_found_as_it_states(bms, tmp_path):
     assert result["theorem"]["grids"][-1] == 32
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", one_cell_preset_names())
 def test_shipped_model_records_all_three_and_uses_the_largest(name):
     model = load_shipped_model(name)
     bounds = model.error_bounds

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from bms.cell import CellState, rates
 from bms.data.profiles import SAMPLE_PERIOD_S, Profiles, draw_profiles
 from bms.data.simulate import PROCESS_NOISE_K_PER_S, joined, simulate
-from bms.presets import load_preset, preset_names
+from bms.presets import load_preset, one_cell_preset_names
 
 
 class NoNoise:
@@ -32,7 +32,7 @@ def profiles_with(current_A, core_limit_K=np.inf, temperature_K=295.0, soc=0.1):
     )
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", one_cell_preset_names())
 def test_samples_follow_the_equations_through_a_step_of_10c(name):
     preset = load_preset(name)
     current_A = np.concatenate([np.full(60, -23.0), np.full(60, 0.0)])
@@ -72,7 +72,7 @@ def test_process_noise_has_the_papers_strength_on_every_thermal_rate():
         assert spread == pytest.approx(PROCESS_NOISE_K_PER_S, rel=0.1)
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", one_cell_preset_names())
 def test_derating_keeps_the_core_at_its_limit(name):
     preset = load_preset(name)
     wanted = profiles_with(np.full(1200, -23.0), core_limit_K=305.0, soc=0.0)
@@ -84,7 +84,7 @@ def test_derating_keeps_the_core_at_its_limit(name):
     assert np.all((samples.inputs[:, 0] >= -23.0) & (samples.inputs[:, 0] <= 0.0))
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", one_cell_preset_names())
 def test_every_sample_lies_in_the_box_and_profiles_end_when_full(name):
     preset = load_preset(name)
     rng = np.random.default_rng(0)

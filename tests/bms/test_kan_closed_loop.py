@@ -5,7 +5,7 @@ import pytest
 
 from bms.cell import CellState, Disturbance, integrate_step
 from bms.model.model_file import load_shipped_model
-from bms.presets import load_preset, preset_names
+from bms.presets import load_preset, one_cell_preset_names
 
 PERIOD_S = 0.5
 CHARGES = 20
@@ -31,7 +31,7 @@ def barrier_current_A(preset, core_K, surface_K):
     return np.where(full, preset.limits.reference_current_A, high)
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", one_cell_preset_names())
 def test_10c_charge_from_the_initial_state_to_full(name):
     preset, model = load_preset(name), load_shipped_model(name)
     rng = np.random.default_rng(4)

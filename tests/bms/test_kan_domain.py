@@ -6,7 +6,7 @@ import pytest
 from bms.errors import InputError
 from bms.kan.domain import EVERYWHERE, Domain, domain_of
 from bms.model.model_file import load_shipped_model
-from bms.presets import preset_names
+from bms.presets import one_cell_preset_names
 
 
 def correlated(count=2000):
@@ -61,7 +61,7 @@ def test_a_domain_that_cannot_be_is_refused(changes, message):
         Domain(**{**good, **changes})
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", one_cell_preset_names())
 def test_shipped_models_flag_a_surface_far_from_any_coolant_it_could_have(name):
     """Each value lies in its own trained range."""
     network = load_shipped_model(name).network

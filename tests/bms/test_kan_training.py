@@ -15,7 +15,7 @@ from bms.kan.settings import TrainingSettings
 from bms.kan.training import train_network
 from bms.model.make import model_for_measurements, model_for_preset
 from bms.model.model_file import load_shipped_model
-from bms.presets import load_preset, preset_names
+from bms.presets import load_preset, one_cell_preset_names
 from tests.bms.kan_samples import random_network, write_recording
 
 SHORT = TrainingSettings(epochs=6, batch=2000, refinement_steps=20)
@@ -119,7 +119,7 @@ def test_width_that_does_not_fit_the_inputs_is_refused():
         TrainingSettings(width=(4, 2))
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", one_cell_preset_names())
 def test_measurement_error_bounds_every_reading_within_the_sensors_bounds(name):
     preset = load_preset(name)
     network = load_shipped_model(name).network

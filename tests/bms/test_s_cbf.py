@@ -16,14 +16,14 @@ from bms.barrier import barrier_constants
 from bms.baselines.s_cbf import SurfaceBarrierController, cascade, charging_current_A
 from bms.cell import CellState, integrate_step
 from bms.decision import ACTIVE_CONSTRAINTS, Observation
-from bms.presets import load_preset, preset_names
+from bms.presets import load_preset, one_cell_preset_names
 
 REFERENCE_A = -23.0
 LIN2014 = SurfaceBarrierController(load_preset("lin2014"))
 TOLD = Observation._fields[:6]
 
 
-@pytest.fixture(params=preset_names(), scope="module")
+@pytest.fixture(params=one_cell_preset_names(), scope="module")
 def preset(request):
     return load_preset(request.param)
 

@@ -12,7 +12,7 @@ from bms.data.measurements import read_measurements
 from bms.data.profiles import draw_profiles
 from bms.data.simulate import simulate
 from bms.model.model_file import load_model, load_shipped_model, shipped_model_path
-from bms.presets import DEFAULT_PRESET, load_preset, preset_names
+from bms.presets import DEFAULT_PRESET, load_preset, one_cell_preset_names
 from tests.bms.kan_samples import write_recording
 
 KEYS = {"rmse_K", "max_abs_error_K", "bias_K", "samples", "extrapolated_samples"}
@@ -132,7 +132,7 @@ def test_lagged_without_constants_takes_those_of_the_kind_of_data(bms, recording
     assert load_model(tmp_path / "model.json").training.settings.lag_time_constants_s == (10, 160)
 
 
-@pytest.mark.parametrize("preset", preset_names())
+@pytest.mark.parametrize("preset", one_cell_preset_names())
 def test_shipped_models_hold_the_promised_accuracy_on_whole_unseen_profiles(preset):
     """Half a dynamic error and a tenth of a kelvin at full steps is what remembering must bring."""
     chosen = load_preset(preset)

@@ -23,7 +23,7 @@ from bms.cell import CellState, Disturbance, integrate_step, rates
 from bms.commands.verify import verify as command
 from bms.firmware import Firmware
 from bms.model.pair import load_pair
-from bms.presets import load_preset, preset_names
+from bms.presets import load_preset, one_cell_preset_names
 from bms.verification import SLIPS, Verification, verify
 from bms.verification.barriers import Barrier
 from bms.verification.conditions import (
@@ -40,7 +40,7 @@ from bms.verification.search import CounterExample
 from bms.verification.thermal import Case, certify, held_integral
 from bms.verification.verify import thermal_cases
 
-NAMES = preset_names()
+NAMES = one_cell_preset_names()
 TIME_LIMIT_S = 60.0
 
 

@@ -15,7 +15,7 @@ from bms.barrier.readings import soc_error_bound
 from bms.barrier.rounding import rounding_allowances
 from bms.bus_signals import BUS
 from bms.firmware import Firmware
-from bms.presets import load_preset, preset_names
+from bms.presets import load_preset, one_cell_preset_names
 from bms.verification.conditions import firmware_constants
 from bms.verification.electrical import certify_soc, certify_voltage
 from tests.bms.plausible_presets import model_for, other_cells, plausible_presets
@@ -29,7 +29,8 @@ def with_limits(preset, **limits):
 
 
 @pytest.mark.parametrize(
-    ("name", "max_voltage_V"), [*product(preset_names(), [3.3, 3.4, 3.45, 3.5, 3.55, 3.6, 3.7])]
+    ("name", "max_voltage_V"),
+    [*product(one_cell_preset_names(), [3.3, 3.4, 3.45, 3.5, 3.55, 3.6, 3.7])],
 )
 def test_shipped_cells_are_certified_at_any_voltage_limit(name, max_voltage_V):
     preset = with_limits(load_preset(name), max_voltage_V=max_voltage_V)
@@ -132,7 +133,7 @@ def test_a_voltage_margin_without_one_of_its_parts_is_refused(name, part):
     assert 0.0 <= certificate.shortfall.state["counted_soc"] <= preset.limits.completion_soc
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", one_cell_preset_names())
 def test_the_voltage_certificate_has_hardly_more_room_than_it_states(name):
     """Up to what it leaves the margin may be lowered, and no more than a microvolt further."""
     preset = load_preset(name)

@@ -14,7 +14,7 @@ from bms.barrier.readings import reading_errors
 from bms.cell import CellState, Disturbance, integrate_step, rates
 from bms.errors import InputError
 from bms.model.pair import load_pair
-from bms.presets import load_preset, preset_names
+from bms.presets import load_preset, one_cell_preset_names
 from bms.verification import SLIPS, verify
 from bms.verification.boxes import Boxes
 from bms.verification.conditions import chains, firmware_constants, required_conditions
@@ -80,7 +80,7 @@ def test_a_hold_as_long_as_the_fast_mode_is_certified_by_histories_from_rest(hel
     assert any(b.certificate.by_history for b in result.barriers)
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", one_cell_preset_names())
 @pytest.mark.parametrize("held", [(0.1, 0.1), (1.0, 2.0)])
 def test_no_history_of_inputs_leaves_the_enclosed_rates_within_the_hold(name, held):
     preset = with_timing(load_preset(name), *held)

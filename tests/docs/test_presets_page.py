@@ -22,14 +22,22 @@ TEXT = (ROOT / "docs" / "presets.md").read_text(encoding="utf-8")
 (EXAMPLE,) = re.findall(r"^```toml\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
 
 
+def inner_table(hint):
+    """The dataclass that a key holds: itself, optional, or a list of them; None for a value."""
+    if dataclasses.is_dataclass(hint):
+        return hint
+    return next(filter(None, map(inner_table, get_args(hint))), None)
+
+
 def keys_of(kind, table=""):
     """Keys of the schema by the table of the file in which they stand."""
     hints = get_type_hints(kind)
     keys = {table: set()}
     for field in dataclasses.fields(kind):
         path = f"{table}.{field.name}".strip(".")
-        if dataclasses.is_dataclass(hints[field.name]) and kind is not Sensors:
-            keys |= keys_of(hints[field.name], path)
+        inner = inner_table(hints[field.name])
+        if inner is not None and kind is not Sensors:
+            keys |= keys_of(inner, path)
         else:
             keys[table].add(field.name)
     return keys

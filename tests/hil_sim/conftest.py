@@ -2,7 +2,7 @@
 
 import pytest
 
-from bms.presets import Preset, load_preset, preset_names
+from bms.presets import Preset, load_preset, one_cell_preset_names
 from hil_sim.bus.database import MessageCodec, load_codecs
 
 
@@ -11,7 +11,7 @@ def preset() -> Preset:
     return load_preset("paper_calibrated")
 
 
-@pytest.fixture(params=preset_names(), scope="session")
+@pytest.fixture(params=one_cell_preset_names(), scope="session")
 def any_preset(request: pytest.FixtureRequest) -> Preset:
     return load_preset(request.param)
 
