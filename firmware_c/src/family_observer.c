@@ -64,22 +64,35 @@ static float soc_at(const rcbf_constants_t *cell, float voltage_V)
     return cell->ocv_soc[low] + share * (cell->ocv_soc[high] - cell->ocv_soc[low]);
 }
 
-void family_begin(family_t *family, const family_constants_t *constants,
-                  const rcbf_constants_t *cell, float plug_in_soc, float voltage_V)
+static bool is_at_rest(const family_constants_t *constants, const family_reading_t *reading)
 {
-    const float error_V = constants->voltage_error_V + constants->ocv_error_V +
-                          constants->rest_polarisation_V +
-                          constants->current_error_A * constants->resistance_ohm[0];
+    return numeric_abs(reading->current_A) <= 2.0f * constants->current_error_A;
+}
+
+void family_begin(family_t *family, const family_constants_t *constants,
+                  const rcbf_constants_t *cell, float plug_in_soc,
+                  const family_reading_t *reading)
+{
     const float told_low = numeric_clamp(plug_in_soc - constants->plug_in_error, 0.0f, 1.0f);
     const float told_high = numeric_clamp(plug_in_soc + constants->plug_in_error, 0.0f, 1.0f);
-    const float seen_low = soc_at(cell, voltage_V - error_V);
-    const float seen_high = soc_at(cell, voltage_V + error_V);
-    float low = larger(told_low, seen_low);
-    float high = smaller(told_high, seen_high);
-    if (low > high) {
-        /* One of both is wrong; nobody knows which. */
-        low = smaller(told_low, seen_low);
-        high = larger(told_high, seen_high);
+    float low = told_low;
+    float high = told_high;
+    if (is_at_rest(constants, reading)) {
+        /* A charge that has just ended has left polarisation as well, which does not lower the
+         * voltage. */
+        const float error_V = constants->voltage_error_V + constants->ocv_error_V +
+                              constants->rest_polarisation_V +
+                              3.0f * constants->current_error_A * constants->resistance_ohm[0];
+        const float seen_low =
+            soc_at(cell, reading->voltage_V - error_V - family->polarisation_V);
+        const float seen_high = soc_at(cell, reading->voltage_V + error_V);
+        low = larger(told_low, seen_low);
+        high = smaller(told_high, seen_high);
+        if (low > high) {
+            /* One of both is wrong; nobody knows which. */
+            low = smaller(told_low, seen_low);
+            high = larger(told_high, seen_high);
+        }
     }
     family->soc_low = (soc_counter_t){ low, 0.0f };
     family->soc_high = (soc_counter_t){ high, 0.0f };
@@ -206,7 +219,9 @@ static float heat_now_W(const family_t *family, const family_constants_t *consta
 
 /* The core obeys C T' = heat - (T - Ts) / R + C nu, and the right-hand side is largest for the
  * greatest R where T is above Ts; so what rises as with the least C and falls as with the greatest
- * C stays above every core of the family. A fall is taken at its end, where it is slowest. */
+ * C stays above every core of the family. A core below its surface is warmed the more the smaller R
+ * is, so that the bound is no lower than the surface. A fall is taken at its end, where it is
+ * slowest. */
 static void follow_core(family_t *family, const family_constants_t *constants,
                         const rcbf_constants_t *cell, const family_reading_t *reading)
 {
@@ -216,6 +231,7 @@ static void follow_core(family_t *family, const family_constants_t *constants,
         larger(reading->surface_temperature_K, family->surface_temperature_K);
     const float surface_room_K = (cell->max_core_temperature_K.high_K - surface_K) +
                                  cell->max_core_temperature_K.low_K - constants->surface_error_K;
+    family->core_room_K = smaller(family->core_room_K, surface_room_K);
     const float disturbance_W =
         constants->disturbance_W +
         strength_A * (constants->disturbance_W_per_A +
@@ -292,11 +308,6 @@ static void look_in_charge(family_t *family, const family_constants_t *constants
         family->core_room_K = room_K;
     }
     window->count = 0u;
-}
-
-static bool is_at_rest(const family_constants_t *constants, const family_reading_t *reading)
-{
-    return numeric_abs(reading->current_A) <= 2.0f * constants->current_error_A;
 }
 
 /* What resistance and polarisation cannot explain of the voltage is open-circuit voltage. */
