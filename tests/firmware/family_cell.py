@@ -12,21 +12,83 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from pathlib import Path
 from typing import Any
 
-from bms.firmware._firmware import ffi, lib
-from bms.firmware.calibration import calibration_block
+from cffi import FFI
+
+from bms.calibration import calibration_fields
 from bms.model.pair import load_pair
-from bms.presets import Preset, load_preset
+from bms.presets import Preset
+from tests.firmware.native_library import FIRMWARE, load_library
 
 SUB_STEPS = 4
+SOURCES = [
+    FIRMWARE / "src" / f"{name}.c"
+    for name in ("rcbf", "soc", "family_tables", "family_observer", "family_decision")
+]
+HEADERS = ["include/rcbf.h", "include/soc.h", "include/family.h", "src/family_tables.h"]
 
 
-@cache
-def family_block(preset: str) -> Any:
-    """The calibration block of a preset (bms_calibration_t *)."""
-    return calibration_block(*load_pair(preset, None), compiled_in=False)
+@dataclass(frozen=True)
+class FamilyCode:
+    """The C code of a family, and the constants of a preset for it."""
+
+    preset: Preset
+    ffi: FFI
+    lib: Any
+    k: Any
+    """family_constants_t *"""
+    cell: Any
+    """rcbf_constants_t *"""
+
+    def of(self, preset: str) -> FamilyCode:
+        """The same code with the constants of another preset."""
+        return _with_constants(preset, self.ffi, self.lib)
+
+    def reading(self, **values: Any) -> Any:
+        """family_reading_t * of a cell at rest at 298 K, but for the values given."""
+        at_rest = {
+            "current_A": 0.0,
+            "voltage_V": 3.30,
+            "surface_temperature_K": 298.0,
+            "coolant_temperature_K": 298.0,
+            "estimated_core_K": math.nan,
+            "command_A": 0.0,
+            "is_usable": True,
+            "is_charging": True,
+        }
+        return self.ffi.new("family_reading_t *", {**at_rest, **values})
+
+    def observer(self) -> Any:
+        """family_t * that knows nothing."""
+        family = self.ffi.new("family_t *")
+        self.lib.family_reset(family)
+        return family
+
+    def begin(self, family: Any, told_soc: float, reading: Any) -> None:
+        self.lib.family_begin(family, self.k, self.cell, told_soc, reading)
+
+    def observe(self, family: Any, reading: Any) -> None:
+        self.lib.family_observe(family, self.k, self.cell, reading)
+
+    def decide(self, family: Any, reading: Any, asked_A: float) -> Any:
+        """Decision on a strength that is asked for."""
+        return self.lib.family_decide(family, self.k, self.cell, reading, -asked_A)
+
+
+def family_code(
+    out: Path, preset: str = "a123_26650_10C", change: tuple[str, str, str] | None = None
+) -> FamilyCode:
+    """Compile the family's sources, perhaps with one of them changed (file, old, new)."""
+    return _with_constants(preset, *load_library(out, SOURCES, HEADERS, change))
+
+
+def _with_constants(preset: str, ffi: FFI, lib: Any) -> FamilyCode:
+    loaded, model = load_pair(preset, None)
+    fields = calibration_fields(loaded, model)
+    constants = ffi.new("family_constants_t *", fields["family"])
+    return FamilyCode(loaded, ffi, lib, constants, ffi.new("rcbf_constants_t *", fields["rcbf"]))
 
 
 def _interpolated(points: Sequence[float], values: Sequence[float], at: float) -> float:
@@ -148,123 +210,31 @@ class Surroundings:
 class Bench:
     """Cell, charger and the firmware's observer and decision, period by period."""
 
-    preset: Preset
+    code: FamilyCode
     member: Member
     state: list[float]
     around: Surroundings = field(default_factory=Surroundings)
-    told_soc: float | None = None
-    library: Any = None
-    """The compiled firmware (ffi and lib); None for the one that is installed."""
 
     def __post_init__(self) -> None:
+        self.preset, self.k = self.code.preset, self.code.k
         self.cell = Cell(self.preset, self.member)
-        self.block = family_block(self.preset.name)
-        self.k, self.rcbf = self.block.family, self.block.rcbf
-        self.family = ffi.new("family_t *")
-        lib.family_reset(self.family)
+        self.family = self.code.observer()
         self.time_s, self.period = 0.0, 0
-        self.supplied_A = 0.0  # after the lag, before the factor
+        self.supplied_A = 0.0
+        """After the lag, before the factor."""
         self.commands_A = [0.0, 0.0]
         self.is_charging = False
-        self.began = False
-        self.decision: Any = None
         self.reading: Any = None
+        self.decision: Any = None
         self.highest_V = -math.inf
 
     @property
     def strength_A(self) -> float:
         return self.supplied_A * self.around.supply_factor
 
-    def _pass(self, time_s: float, command_A: float) -> None:
-        step_s = time_s / SUB_STEPS
-        if step_s == 0.0:
-            return
-        lag_s, cell, around, noise = self.around.lag_s, self.cell, self.around, self.preset.uncertainty
-
-        def supplied_A(after_s: float) -> float:
-            if lag_s == 0.0:
-                return command_A
-            return command_A + (begin_A - command_A) * math.exp(-after_s / lag_s)
-
-        for _ in range(SUB_STEPS):
-            begin_A = self.supplied_A
-            cooling_W = around.cooling_W(self.time_s, self.state)
-
-            def rates(after_s: float, state: Sequence[float]) -> list[float]:
-                a = supplied_A(after_s) * around.supply_factor
-                disturbance = (
-                    around.core_noise(self.time_s) * float(noise.core_at_K_per_s(a)),
-                    around.surface_noise(self.time_s) * noise.surface_K_per_s,
-                    0.0,
-                )
-                return cell.rates(state, a, cooling_W, disturbance)
-
-            x = self.state
-            self.highest_V = max(
-                self.highest_V, cell.voltage_V(x, supplied_A(0.0) * around.supply_factor)
-            )
-            k1 = rates(0.0, x)
-            k2 = rates(0.5 * step_s, [v + 0.5 * step_s * d for v, d in zip(x, k1)])
-            k3 = rates(0.5 * step_s, [v + 0.5 * step_s * d for v, d in zip(x, k2)])
-            k4 = rates(step_s, [v + step_s * d for v, d in zip(x, k3)])
-            self.state = [
-                v + step_s / 6.0 * (a + 2.0 * b + 2.0 * c + d)
-                for v, a, b, c, d in zip(x, k1, k2, k3, k4)
-            ]
-            self.supplied_A = supplied_A(step_s)
-            self.time_s += step_s
-            self.highest_V = max(self.highest_V, cell.voltage_V(self.state, self.strength_A))
-
-    def read(self) -> Any:
-        current, voltage, surface, coolant = self.around.errors(self.time_s)
-        a = self.strength_A
-        self.reading = ffi.new(
-            "family_reading_t *",
-            {
-                "current_A": -a + current * self.k.current_error_A,
-                "voltage_V": self.cell.voltage_V(self.state, a) + voltage * self.k.voltage_error_V,
-                "surface_temperature_K": self.state[2] + surface * self.k.surface_error_K,
-                "coolant_temperature_K": self.state[3] + coolant * self.k.coolant_error_K,
-                "estimated_core_K": math.nan,
-                "command_A": -self.commands_A[0],
-                "is_usable": not self.around.is_lost(self.period),
-                "is_charging": self.is_charging,
-            },
-        )
-        return self.reading
-
-    def begin(self, told_soc: float | None = None) -> None:
-        """The charge begins with this period's readings."""
-        told = self.state[0] if told_soc is None else told_soc
-        begin(self, told)
-        self.is_charging = True
-
-    def observe(self) -> None:
-        self.read()
-        lib.family_observe(
-            self.family, ffi.addressof(self.k), ffi.addressof(self.rcbf), self.reading
-        )
-
-    def decide(self, strongest_A: float | None = None) -> float:
-        """Strength that is commanded, within the growth limit."""
-        limits = self.preset.limits
-        grown_A = self.commands_A[0] + limits.current_growth_A_per_s * self.k.period_s
-        wanted_A = min(grown_A, -limits.reference_current_A)
-        if strongest_A is not None:
-            wanted_A = min(wanted_A, strongest_A)
-        self.reading.is_charging = True
-        self.decision = lib.family_decide(
-            self.family, ffi.addressof(self.k), ffi.addressof(self.rcbf), self.reading, -wanted_A
-        )
-        return float(-self.decision.current_A)
-
-    def run_period(self, command_A: float) -> None:
-        """Let the period pass; the command comes into force after the delay."""
-        period_s, delay_s = self.k.period_s, self.around.delay_s
-        self._pass(delay_s, self.commands_A[0])
-        self._pass(period_s - delay_s, command_A)
-        self.commands_A = [command_A, self.commands_A[0]]
-        self.period += 1
+    @property
+    def voltage_V(self) -> float:
+        return self.cell.voltage_V(self.state, self.strength_A)
 
     @property
     def core_room_K(self) -> float:
@@ -273,19 +243,74 @@ class Bench:
     @property
     def is_full(self) -> bool:
         completion = self.preset.limits.completion_soc
-        return bool(lib.family_is_full(self.family, ffi.addressof(self.k), completion))
+        return bool(self.code.lib.family_is_full(self.family, self.k, completion))
 
+    def observe(self) -> None:
+        """Take the readings of this period."""
+        current, voltage, surface, coolant = self.around.errors(self.time_s)
+        self.reading = self.code.reading(
+            current_A=-self.strength_A + current * self.k.current_error_A,
+            voltage_V=self.voltage_V + voltage * self.k.voltage_error_V,
+            surface_temperature_K=self.state[2] + surface * self.k.surface_error_K,
+            coolant_temperature_K=self.state[3] + coolant * self.k.coolant_error_K,
+            command_A=-self.commands_A[0],
+            is_usable=not self.around.is_lost(self.period),
+            is_charging=self.is_charging,
+        )
+        self.code.observe(self.family, self.reading)
 
-def begin(bench: Bench, told_soc: float) -> None:
-    """family_begin with the present readings."""
-    lib.family_begin(
-        bench.family,
-        ffi.addressof(bench.k),
-        ffi.addressof(bench.rcbf),
-        told_soc,
-        bench.reading,
-    )
+    def begin(self, told_soc: float | None = None) -> None:
+        """The charge begins with this period's readings."""
+        self.code.begin(self.family, self.state[0] if told_soc is None else told_soc, self.reading)
+        self.is_charging = self.reading.is_charging = True
 
+    def decide(self, strongest_A: float = math.inf) -> float:
+        """Strength that is commanded, within the growth limit; 0 without usable readings."""
+        limits = self.preset.limits
+        grown_A = self.commands_A[0] + limits.current_growth_A_per_s * self.k.period_s
+        wanted_A = min(grown_A, -limits.reference_current_A, strongest_A)
+        self.decision = self.code.decide(self.family, self.reading, wanted_A)
+        return float(-self.decision.current_A)
 
-def preset_of(name: str) -> Preset:
-    return load_preset(name)
+    def run_period(self, command_A: float) -> None:
+        """Let the period pass; the command comes into force after the delay."""
+        self._pass(self.around.delay_s, self.commands_A[0])
+        self._pass(self.k.period_s - self.around.delay_s, command_A)
+        self.commands_A = [command_A, self.commands_A[0]]
+        self.period += 1
+
+    def _pass(self, time_s: float, command_A: float) -> None:
+        if time_s <= 0.0:
+            return
+        step_s = time_s / SUB_STEPS
+        self.highest_V = max(self.highest_V, self.voltage_V)
+        for _ in range(SUB_STEPS):
+            self._step(step_s, command_A)
+            self.highest_V = max(self.highest_V, self.voltage_V)
+
+    def _step(self, step_s: float, command_A: float) -> None:
+        around, noise, start_A = self.around, self.preset.uncertainty, self.supplied_A
+        cooling_W = around.cooling_W(self.time_s, self.state)
+        core_share, surface_share = around.core_noise(self.time_s), around.surface_noise(self.time_s)
+
+        def supplied_A(after_s: float) -> float:
+            left = math.exp(-after_s / around.lag_s) if around.lag_s > 0.0 else 0.0
+            return command_A + (start_A - command_A) * left
+
+        def rates(after_s: float, state: Sequence[float]) -> list[float]:
+            strength_A = supplied_A(after_s) * around.supply_factor
+            core_K_per_s = core_share * float(noise.core_at_K_per_s(strength_A))
+            disturbance = (core_K_per_s, surface_share * noise.surface_K_per_s, 0.0)
+            return self.cell.rates(state, strength_A, cooling_W, disturbance)
+
+        def moved(rate: Sequence[float], by_s: float) -> list[float]:
+            return [value + by_s * change for value, change in zip(self.state, rate)]
+
+        first = rates(0.0, self.state)
+        second = rates(0.5 * step_s, moved(first, 0.5 * step_s))
+        third = rates(0.5 * step_s, moved(second, 0.5 * step_s))
+        fourth = rates(step_s, moved(third, step_s))
+        mean = [(a + 2.0 * b + 2.0 * c + d) / 6.0 for a, b, c, d in zip(first, second, third, fourth)]
+        self.state = moved(mean, step_s)
+        self.supplied_A = supplied_A(step_s)
+        self.time_s += step_s
