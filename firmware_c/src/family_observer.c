@@ -245,71 +245,6 @@ static void follow_core(family_t *family, const family_constants_t *constants,
     family->core_is_known = family->core_is_known && numeric_is_finite(family->core_room_K);
 }
 
-static void add_to(family_window_t *window, const family_reading_t *reading)
-{
-    const float surface_K = reading->surface_temperature_K;
-    if (window->count == 0u) {
-        *window = (family_window_t){ .first_K = surface_K };
-    }
-    window->count++;
-    window->sum_K += surface_K - window->first_K;
-    window->gap_K += surface_K - reading->coolant_temperature_K;
-}
-
-/* The surface's own balance tells the mean of the core over a time:
- *   Tc - Ts = Rc Cs (Ts' - nu) + (Rc / Rs) (Ts - Tinf)
- * and a core without current is no hotter than its mean, unless the surface is hotter still. */
-static void look_at_rest(family_t *family, const family_constants_t *constants,
-                         const rcbf_constants_t *cell, const family_reading_t *reading)
-{
-    family_window_t *window = &family->rest;
-    const float surface_K = reading->surface_temperature_K;
-    add_to(window, reading);
-    if (window->count < constants->rest_periods) {
-        return;
-    }
-    const float share = 1.0f / (float)window->count;
-    const float mean_K = window->first_K + share * window->sum_K;
-    const float above_K =
-        larger(0.0f, surface_K - window->first_K) * constants->per_surface_rise +
-        larger(0.0f, share * window->gap_K) * constants->per_coolant_gap;
-    const float heated_K = (float)window->count * constants->heating_K_per_W * family->heat_W;
-    const float hottest_K =
-        larger(surface_K, mean_K + above_K) + constants->rest_error_K + larger(0.0f, heated_K);
-    const float room_K = (cell->max_core_temperature_K.high_K - hottest_K) +
-                         cell->max_core_temperature_K.low_K;
-    if (!family->core_is_known || (room_K > family->core_room_K)) {
-        family->core_room_K = room_K;
-        family->core_is_known = numeric_is_finite(room_K);
-    }
-    window->count = 0u;
-}
-
-/* A surface that says that the core is hotter than the measured heat can have made it contradicts the
- * voltage or itself. The hotter one is believed. */
-static void look_in_charge(family_t *family, const family_constants_t *constants,
-                           const rcbf_constants_t *cell, const family_reading_t *reading)
-{
-    family_window_t *window = &family->charge;
-    add_to(window, reading);
-    if (window->count < constants->charge_periods) {
-        return;
-    }
-    const float share = 1.0f / (float)window->count;
-    const float rise_K = reading->surface_temperature_K - window->first_K;
-    const float per_rise = (rise_K > 0.0f) ? constants->least_per_surface_rise
-                                           : constants->most_per_surface_fall;
-    const float gap_K = share * window->gap_K;
-    const float least_K = window->first_K + share * window->sum_K + rise_K * per_rise +
-                          gap_K * constants->least_per_coolant_gap - constants->charge_error_K;
-    const float room_K = (cell->max_core_temperature_K.high_K - least_K) +
-                         cell->max_core_temperature_K.low_K;
-    if ((gap_K > 0.0f) && (room_K < family->core_room_K)) {
-        family->core_room_K = room_K;
-    }
-    window->count = 0u;
-}
-
 /* What resistance and polarisation cannot explain of the voltage is open-circuit voltage. */
 static void look_for_full(family_t *family, const family_constants_t *constants,
                           const family_reading_t *reading)
@@ -324,7 +259,7 @@ static void look_for_full(family_t *family, const family_constants_t *constants,
 }
 
 /* Without readings the core takes up all the heat that the strongest possible current can make; for
- * a few periods only, since the reaction to missing readings is 0 A and nothing is known for long. */
+ * a few periods only, since the reaction to missing readings is 0 A and nothing is known long. */
 static void bridge(family_t *family, const family_constants_t *constants)
 {
     family->bridged++;
@@ -368,50 +303,13 @@ void family_observe(family_t *family, const family_constants_t *constants,
     look_for_full(family, constants, reading);
     if (is_at_rest(constants, reading)) {
         follow_core(family, constants, cell, reading);
-        look_at_rest(family, constants, cell, reading);
+        family_look_at_rest(family, constants, cell, reading);
         family->charge.count = 0u;
     } else if (reading->is_charging) {
         follow_core(family, constants, cell, reading);
-        look_in_charge(family, constants, cell, reading);
+        family_look_in_charge(family, constants, cell, reading);
         family->rest.count = 0u;
     } else {
         forget_after_load(family, constants);
     }
-}
-
-bool family_is_full(const family_t *family, const family_constants_t *constants,
-                    float completion_soc)
-{
-    return (family->soc_known && (family->soc_low.soc >= completion_soc)) ||
-           (family->full_count >= constants->full_periods);
-}
-
-bool family_is_too_hot(const family_t *family, const family_constants_t *constants,
-                       float current_A, float overshoot_K)
-{
-    return family->core_is_known && (family->core_room_K < -overshoot_K) &&
-           (-current_A > 2.0f * constants->current_error_A);
-}
-
-bool family_supply_is_plausible(const family_t *family, const family_constants_t *constants,
-                                float current_A, float deviation_A)
-{
-    const float strength_A = -current_A;
-    const float low_A = family->supply_low_A * (1.0f - constants->supply_tolerance);
-    const float high_A = family->supply_high_A * (1.0f + constants->supply_tolerance);
-    return (strength_A >= low_A - deviation_A) && (strength_A <= high_A + deviation_A);
-}
-
-bool family_voltage_is_plausible(const family_t *family, const family_constants_t *constants,
-                                 const rcbf_constants_t *cell, const family_reading_t *reading,
-                                 float deviation_V)
-{
-    const family_heat_t heat = family_heat(family, constants, reading);
-    const float spread_V = constants->ocv_error_V + family->rest_polarisation_V + deviation_V;
-    const float low_V = rcbf_open_circuit_voltage_V(cell, family->soc_low.soc) +
-                        heat.least_resistance_ohm * heat.at_least_A - spread_V;
-    const float high_V = rcbf_open_circuit_voltage_V(cell, family->soc_high.soc) +
-                         heat.resistance_ohm * heat.at_most_A +
-                         family->polarisation_V + spread_V;
-    return (reading->voltage_V >= low_V) && (reading->voltage_V <= high_V);
 }

@@ -171,8 +171,8 @@ bool family_constants_are_valid(const family_constants_t *k)
     const float positive[] = { k->least_soc_per_A,  k->greatest_soc_per_A, k->hold_soc_per_A,
                                k->coldest_K,        k->per_step_K,         k->least_resistance_ohm,
                                k->outflow_W_per_K,  k->core_K_per_J,       k->heating_K_per_W,
-                               k->cooling_K_per_W,  k->coldest_core_K,     k->hold_s,           k->period_s,
-                               k->full_ocv_V,       k->estimate_error_K };
+                               k->cooling_K_per_W,  k->coldest_core_K,     k->hold_s,
+                               k->period_s,         k->full_ocv_V,       k->estimate_error_K };
     const float not_negative[] = { k->plug_in_error,        k->ocv_error_V,
                                    k->polarisation_ohm,     k->rest_polarisation_V,
                                    k->rest_drift_per_s,     k->inner_K,

@@ -25,7 +25,10 @@ from tests.firmware.native_library import FIRMWARE, load_library
 SUB_STEPS = 4
 SOURCES = [
     FIRMWARE / "src" / f"{name}.c"
-    for name in ("rcbf", "soc", "family_tables", "family_observer", "family_decision")
+    for name in (
+        *("rcbf", "soc", "family_tables", "family_observer", "family_plausibility"),
+        *("family_windows", "family_decision"),
+    )
 ]
 HEADERS = ["include/rcbf.h", "include/soc.h", "include/family.h", "src/family_tables.h"]
 
@@ -136,9 +139,7 @@ class Cell:
         self._ohm_K = list(cell.resistance.temperature_K)
         self._entropy = cell.entropy
         self._ocv = cell.ocv
-        self.branch_ohm = [
-            b.resistance_ohm * f for b, f in zip(cell.branches, member.polarisation)
-        ]
+        self.branch_ohm = [b.resistance_ohm * f for b, f in zip(cell.branches, member.polarisation)]
         self.branch_s = [b.time_constant_s * f for b, f in zip(cell.branches, member.relaxation)]
 
     def resistance_ohm(self, core_K: float) -> float:
@@ -291,7 +292,10 @@ class Bench:
     def _step(self, step_s: float, command_A: float) -> None:
         around, noise, start_A = self.around, self.preset.uncertainty, self.supplied_A
         cooling_W = around.cooling_W(self.time_s, self.state)
-        core_share, surface_share = around.core_noise(self.time_s), around.surface_noise(self.time_s)
+        core_share, surface_share = (
+            around.core_noise(self.time_s),
+            around.surface_noise(self.time_s),
+        )
 
         def supplied_A(after_s: float) -> float:
             left = math.exp(-after_s / around.lag_s) if around.lag_s > 0.0 else 0.0
@@ -310,7 +314,9 @@ class Bench:
         second = rates(0.5 * step_s, moved(first, 0.5 * step_s))
         third = rates(0.5 * step_s, moved(second, 0.5 * step_s))
         fourth = rates(step_s, moved(third, step_s))
-        mean = [(a + 2.0 * b + 2.0 * c + d) / 6.0 for a, b, c, d in zip(first, second, third, fourth)]
+        mean = [
+            (a + 2.0 * b + 2.0 * c + d) / 6.0 for a, b, c, d in zip(first, second, third, fourth)
+        ]
         self.state = moved(mean, step_s)
         self.supplied_A = supplied_A(step_s)
         self.time_s += step_s

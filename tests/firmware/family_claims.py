@@ -26,7 +26,10 @@ class Start:
     told_error: float = 0.0
 
     def state(self) -> list[float]:
-        core_K, coolant_K = self.surface_K + self.core_excess_K, self.surface_K + self.coolant_excess_K
+        core_K, coolant_K = (
+            self.surface_K + self.core_excess_K,
+            self.surface_K + self.coolant_excess_K,
+        )
         return [self.soc, core_K, self.surface_K, coolant_K, *self.branches_V]
 
 
@@ -38,11 +41,13 @@ def charge(
     time_s: float,
     strongest_A: float = math.inf,
     pauses: tuple[tuple[float, float], ...] = (),
+    is_core_told: bool = False,
 ) -> dict[str, float]:
     """Worst excess by claim: all are at most 0 where the claims hold.
 
     In a pause, given by its beginning and its length in s, nothing is commanded; after it a new
-    charge begins with a new state of charge from the charger.
+    charge begins with a new state of charge from the charger. With is_core_told the observer begins
+    with the true core temperature, as if rest had told it without an error.
     """
     bench = Bench(code, member, start.state(), around)
     limits = code.preset.limits
@@ -61,6 +66,8 @@ def charge(
             ready_s, bench.is_charging = bench.time_s + waits.pop(0)[1], False
         if not bench.is_charging and usable and bench.time_s >= ready_s:
             bench.begin(min(max(bench.state[0] + start.told_error, 0.0), 1.0))
+        if is_core_told and family.core_is_known:
+            family.core_room_K, is_core_told = bench.core_room_K, False
         if family.soc_known:
             hold("charge is no less", family.soc_low.soc - bench.state[0] - ROUNDING_SOC)
             hold("charge is no more", bench.state[0] - family.soc_high.soc - ROUNDING_SOC)
