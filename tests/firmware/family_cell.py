@@ -2,8 +2,8 @@
 
 Written from the physics in docs/family.md and the preset's numbers alone: two thermal masses and
 coolant, ohmic resistance over the core's temperature, branches, reversible heat and an open-circuit
-voltage that rises steeply beyond full; integrated by the classical Runge-Kutta method. The firmware's
-observer and decision run on it as C code.
+voltage that rises steeply beyond full; integrated by the classical Runge-Kutta method. Observer and
+decision run on it as C code.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ def charge(
     worst: dict[str, float] = {}
 
     def hold(claim: str, excess: float) -> None:
-        worst[claim] = max(worst.get(claim, -math.inf), excess if excess == excess else math.inf)
+        worst[claim] = max(worst.get(claim, -math.inf), math.inf if math.isnan(excess) else excess)
 
     waits = [*pauses, (math.inf, 0.0)]
     ready_s = REST_S

@@ -40,8 +40,7 @@ def _top(code: FamilyCode) -> dict[str, float]:
 
 
 def _cold(code: FamilyCode) -> dict[str, float]:
-    around = replace(LOW_READINGS, lag_s=0.3)
-    return charge(code, OLD, Start(0.5, 279.0, told_error=0.05), around, 60.0)
+    return charge(code, OLD, Start(0.5, 279.0, told_error=0.05), LOW_READINGS, 60.0)
 
 
 def _new_told_too_much(code: FamilyCode) -> dict[str, float]:
@@ -131,7 +130,8 @@ MUTANTS = [
     Mutant("family_windows.c", " * constants->per_surface_rise +", " * 0.0f +", "hot inside", "core is no hotter"),
     Mutant(DECISION, "- constants->voltage_error_V - drifting_V;", "+ 0.01f;", "top", "voltage"),
     Mutant(DECISION, "decision.current_A = -allowed_A / factor;", "decision.current_A = -allowed_A;", "cold", "voltage"),
-    Mutant(DECISION, "constants->gain_W_per_K * (room_K - constants->inner_K)", "constants->gain_W_per_K * (room_K + 0.5f)", "hot charge", "core"),
+    Mutant(TABLES, "return past_A * heat->overpotential_V +", "return 0.8f * past_A * heat->overpotential_V +", "hot charge", "core is no hotter"),
+    Mutant(DECISION, "return core->outflow_W - heat_W -", "return 9.0f + core->outflow_W - heat_W -", "hot charge", "core"),
 ]  # fmt: skip
 
 

@@ -163,7 +163,7 @@ def test_the_strength_of_a_limit_is_the_largest_that_keeps_it(
     known, _ = measured(code, history, 0.05)
     for heat_W, strength_A in bounds(code):
 
-        def left_W(at_A: float) -> float:
+        def left_W(at_A: float, heat_W: Any = heat_W) -> float:
             used_W = float(heat_W(known, at_A)) + slope * at_A + square * at_A**2
             return limit_W - used_W
 
