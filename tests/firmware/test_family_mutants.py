@@ -35,6 +35,12 @@ def _hot_charge(code: FamilyCode, member: Member = SLOW) -> dict[str, float]:
     return charge(code, member, start, LOW_READINGS, 250.0, is_core_told=True)
 
 
+def _new_and_hot(code: FamilyCode) -> dict[str, float]:
+    start, member = Start(0.15, 318.0, told_error=0.05), replace(SLOW, resistance=1.0)
+    around = replace(LOW_READINGS, lag_s=1.0)
+    return charge(code, member, start, around, 200.0, is_core_told=True)
+
+
 def _top(code: FamilyCode) -> dict[str, float]:
     return charge(code, OLD, Start(0.9, told_error=-0.05), LOW_READINGS, 200.0)
 
@@ -93,6 +99,7 @@ def _lost(code: FamilyCode) -> dict[str, float]:
 SCENARIOS: Mapping[str, Callable[[FamilyCode], dict[str, float]]] = MappingProxyType(
     {
         "hot charge": _hot_charge,
+        "new and hot": _new_and_hot,
         "top": _top,
         "cold": _cold,
         "told too much": _new_told_too_much,
@@ -131,7 +138,7 @@ MUTANTS = [
     Mutant(DECISION, "- constants->voltage_error_V - drifting_V;", "+ 0.01f;", "top", "voltage"),
     Mutant(DECISION, "decision.current_A = -allowed_A / factor;", "decision.current_A = -allowed_A;", "cold", "voltage"),
     Mutant(TABLES, "return past_A * heat->overpotential_V +", "return 0.8f * past_A * heat->overpotential_V +", "hot charge", "core is no hotter"),
-    Mutant(DECISION, "return core->outflow_W - heat_W -", "return 9.0f + core->outflow_W - heat_W -", "hot charge", "core"),
+    Mutant(OBSERVER, "    family->core_room_K -=\n        ((net_W", "    family->core_room_K -=\n        0.0f * ((net_W", "new and hot", "core is no hotter"),
 ]  # fmt: skip
 
 
