@@ -18,6 +18,10 @@ START = "reset_handler"
 CONTROL, CORE, BOOT, IMAGE = "control", "core", "boot", "image"
 CONTROL_MODULES = (
     *(f"src/{name}" for name in ("calibration", "history", "kan", "rcbf", "soc", "thermal")),
+    *(
+        f"src/family_{name}"
+        for name in ("decision", "observer", "plausibility", "tables", "windows")
+    ),
     "generated/calibration_default",
 )
 """What estimates and decides, with its tables; the rest of the core is CAN, monitor and states."""

@@ -152,9 +152,11 @@ bool family_constants_are_valid(const family_constants_t *constants);
 /* Nothing is known of the cell. */
 void family_reset(family_t *family);
 
-/* A charge begins at this state of charge, more or less; the voltage is that of the cell at rest. */
+/* A charge begins at this state of charge, more or less; the voltage of a cell at rest tells it too.
+ */
 void family_begin(family_t *family, const family_constants_t *constants,
-                  const rcbf_constants_t *cell, float plug_in_soc, float voltage_V);
+                  const rcbf_constants_t *cell, float plug_in_soc,
+                  const family_reading_t *reading);
 
 /* Takes the readings of one period. */
 void family_observe(family_t *family, const family_constants_t *constants,

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stddef.h>
 
+#include "bms_symptoms.h"
 #include "can_catalog.h"
 #include "numeric.h"
 #include "request.h"
@@ -17,32 +18,6 @@ typedef char faults_fit_into_their_mask[(FAULT_COUNT <= 32) ? 1 : -1];
 static const rcbf_decision_t NO_DECISION = {
     0.0f, false, RCBF_INVALID, NAN, NAN, { NAN, NAN, NAN, NAN }
 };
-
-static uint32_t bit_if(bool condition, fault_t fault)
-{
-    return condition ? ((uint32_t)1u << (uint32_t)fault) : 0u;
-}
-
-static bool is_outside(float value, const range_t *range)
-{
-    return !((value >= range->low) && (value <= range->high));
-}
-
-static bool is_charging(const bms_t *bms)
-{
-    return (bms->state == BMS_CHARGING) || (bms->state == BMS_DERATED);
-}
-
-static bool is_usable(const bms_t *bms, uint32_t message)
-{
-    return bms->network.is_usable[message];
-}
-
-/* What a message said last still counts, though no frame came in this period. */
-static bool is_valid(const bms_t *bms, uint32_t message)
-{
-    return bms->network.receivers[message].state == E2E_VALID;
-}
 
 void bms_init(bms_t *bms, const bms_config_t *config)
 {
@@ -60,140 +35,6 @@ void bms_init(bms_t *bms, const bms_config_t *config)
 void bms_receive(bms_t *bms, const can_frame_t *frame)
 {
     network_receive(&bms->network, frame, &bms->measurement);
-}
-
-static uint32_t symptoms_of_missing_messages(const bms_t *bms)
-{
-    static const fault_t MISSING[CAN_RECEIVED_COUNT] = {
-        [CAN_RECEIVED_CELL_ELECTRICAL] = FAULT_ELECTRICAL_MISSING,
-        [CAN_RECEIVED_CELL_THERMAL] = FAULT_THERMAL_MISSING,
-        [CAN_RECEIVED_COOLANT] = FAULT_COOLANT_MISSING,
-        [CAN_RECEIVED_CHARGE_REQUEST] = FAULT_REQUEST_MISSING,
-    };
-    uint32_t symptoms = bit_if(bms->network.is_disturbed, FAULT_CORRUPTED_FRAMES);
-    for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
-        symptoms |= bit_if(!CAN_RECEIVED[i].is_optional && !is_usable(bms, i), MISSING[i]);
-    }
-    return symptoms;
-}
-
-static bool has_family(const bms_t *bms)
-{
-    return bms->calibration->family.is_stated != 0u;
-}
-
-/* What the readings say, and what is in force while they are taken. */
-static family_reading_t reading_of(const bms_t *bms)
-{
-    const codec_measurement_t *m = &bms->measurement;
-    const plausibility_t *limits = &bms->calibration->plausibility;
-    return (family_reading_t){
-        .current_A = m->current_A,
-        .voltage_V = m->voltage_V,
-        .surface_temperature_K = bms->surface_temperature_K,
-        .coolant_temperature_K = m->coolant_temperature_K,
-        .estimated_core_K = bms->estimate.in_domain ? bms->estimate.core_temperature_K : NAN,
-        .command_A = bms->command_A,
-        .is_usable = is_usable(bms, CAN_RECEIVED_CELL_ELECTRICAL) &&
-                     is_usable(bms, CAN_RECEIVED_CELL_THERMAL) &&
-                     !is_outside(m->current_A, &limits->current_A) &&
-                     !is_outside(m->voltage_V, &limits->voltage_V) &&
-                     !is_outside(m->surface_temperature_K, &limits->surface_temperature_K) &&
-                     !is_outside(m->coolant_temperature_K, &limits->coolant_temperature_K),
-        .is_charging = is_charging(bms),
-    };
-}
-
-static bool current_deviates(const bms_t *bms)
-{
-    const bms_calibration_t *calibration = bms->calibration;
-    const float current_A = bms->measurement.current_A;
-    const float deviation_A = calibration->plausibility.current_deviation_A;
-    if (has_family(bms)) {
-        return !family_supply_is_plausible(&bms->family, &calibration->family, current_A,
-                                           deviation_A);
-    }
-    return numeric_abs(current_A - bms->command_A) > deviation_A;
-}
-
-static bool voltage_deviates(const bms_t *bms)
-{
-    const bms_calibration_t *calibration = bms->calibration;
-    const codec_measurement_t *m = &bms->measurement;
-    const rcbf_constants_t *cell = &calibration->rcbf;
-    const float deviation_V = calibration->plausibility.voltage_deviation_V;
-    if (has_family(bms)) {
-        const family_reading_t reading = reading_of(bms);
-        return !family_voltage_is_plausible(&bms->family, &calibration->family, cell, &reading,
-                                            deviation_V);
-    }
-    const float model_V = rcbf_open_circuit_voltage_V(cell, bms->soc.soc) -
-                          m->current_A * cell->ohmic_resistance_ohm;
-    return numeric_abs(m->voltage_V - model_V) > deviation_V;
-}
-
-static bool core_is_too_hot(const bms_t *bms)
-{
-    const bms_calibration_t *calibration = bms->calibration;
-    const float overshoot_K = calibration->plausibility.temperature_overshoot_K;
-    if (has_family(bms)) {
-        /* A cell that comes hot from a drive waits at 0 A; one that is charged all the same does
-         * not do what it is told. */
-        const family_reading_t reading = reading_of(bms);
-        return is_charging(bms) &&
-               family_is_too_hot(&bms->family, &calibration->family, &calibration->rcbf, &reading,
-                                 overshoot_K);
-    }
-    const rcbf_constants_t *cell = &calibration->rcbf;
-    return bms->estimate.core_temperature_K > cell->max_core_temperature_K.high_K +
-                                                  cell->estimation_error_bound_K + overshoot_K;
-}
-
-/* Whether the decision relies on an estimate that training has not seen. */
-static bool is_out_of_domain(const bms_t *bms)
-{
-    return !bms->estimate.in_domain && !has_family(bms);
-}
-
-static uint32_t symptoms_of_readings(const bms_t *bms)
-{
-    const codec_measurement_t *m = &bms->measurement;
-    const plausibility_t *limits = &bms->calibration->plausibility;
-    const rcbf_constants_t *cell = &bms->calibration->rcbf;
-    const bool electrical = is_usable(bms, CAN_RECEIVED_CELL_ELECTRICAL);
-    const bool thermal = is_usable(bms, CAN_RECEIVED_CELL_THERMAL);
-    const bool coolant = is_usable(bms, CAN_RECEIVED_COOLANT);
-    const float surface_limit_K =
-        cell->max_surface_temperature_K.high_K + limits->temperature_overshoot_K;
-
-    return bit_if(electrical && is_outside(m->current_A, &limits->current_A),
-                  FAULT_CURRENT_RANGE) |
-           bit_if(electrical && is_outside(m->voltage_V, &limits->voltage_V),
-                  FAULT_VOLTAGE_RANGE) |
-           bit_if(thermal && is_outside(m->surface_temperature_K, &limits->surface_temperature_K),
-                  FAULT_SURFACE_RANGE) |
-           bit_if(thermal && is_outside(m->coolant_temperature_K, &limits->coolant_temperature_K),
-                  FAULT_COOLANT_RANGE) |
-           bit_if(coolant && is_outside(m->cooling_power_W, &limits->cooling_power_W),
-                  FAULT_COOLING_RANGE) |
-           bit_if(is_usable(bms, CAN_RECEIVED_CHARGE_REQUEST) &&
-                      !request_is_valid(m, is_valid(bms, CAN_RECEIVED_CHARGE_MODE),
-                                        cell->max_soc),
-                  FAULT_REQUEST_INVALID) |
-           bit_if(electrical && thermal && coolant && is_out_of_domain(bms),
-                  FAULT_OUT_OF_DOMAIN) |
-           bit_if(electrical && current_deviates(bms), FAULT_CURRENT_DEVIATION) |
-           bit_if(electrical && bms->soc_known && voltage_deviates(bms),
-                  FAULT_VOLTAGE_DEVIATION) |
-           bit_if(electrical &&
-                      (m->voltage_V > cell->max_voltage_V + limits->voltage_overshoot_V),
-                  FAULT_OVER_VOLTAGE) |
-           bit_if(thermal && core_is_too_hot(bms), FAULT_CORE_OVER_TEMPERATURE) |
-           bit_if(thermal && (m->surface_temperature_K > surface_limit_K),
-                  FAULT_SURFACE_OVER_TEMPERATURE) |
-           bit_if(thermal && (bms->surface_temperature_K - m->surface_temperature_K >
-                              limits->surface_deficit_K),
-                  FAULT_SURFACE_DEFICIT);
 }
 
 /* A sensor that is stuck or has come off reads colder than the heat allows; what the heat allows
@@ -284,8 +125,9 @@ static void follow_request(bms_t *bms, uint32_t symptoms)
     } else if ((bms->state == BMS_STANDBY) && bms->may_start && (symptoms == 0u)) {
         soc_set(&bms->soc, bms->measurement.plug_in_soc);
         if (has_family(bms)) {
+            const family_reading_t reading = reading_of(bms);
             family_begin(&bms->family, &bms->calibration->family, &bms->calibration->rcbf,
-                         bms->measurement.plug_in_soc, bms->measurement.voltage_V);
+                         bms->measurement.plug_in_soc, &reading);
         }
         bms->soc_known = true;
         bms->may_start = false;
@@ -351,7 +193,7 @@ static void run_period(bms_t *bms)
         return;
     }
     update_estimates(bms);
-    uint32_t symptoms = symptoms_of_missing_messages(bms) | symptoms_of_readings(bms);
+    uint32_t symptoms = bms_symptoms(bms);
     if (bms->state == BMS_INIT) {
         if (history_is_settling(&bms->history, &bms->calibration->kan)) {
             /* Filters that have not settled are no fault while nobody relies on them. */

@@ -112,8 +112,8 @@ rcbf_decision_t family_decide(const family_t *family, const family_constants_t *
                               float reference_current_A)
 {
     rcbf_decision_t decision = { 0.0f, false, RCBF_INVALID, 0.0f, 0.0f, { 0.0f } };
-    if (!reading->is_usable || !(reference_current_A <= 0.0f) ||
-        !(reference_current_A >= -FLT_MAX)) {
+    if (!reading->is_usable || !numeric_is_finite(reading->current_A) ||
+        !(reference_current_A <= 0.0f) || !(reference_current_A >= -FLT_MAX)) {
         return decision;
     }
     const float measured_A = larger(-reading->current_A, 0.0f);

@@ -64,22 +64,35 @@ static float soc_at(const rcbf_constants_t *cell, float voltage_V)
     return cell->ocv_soc[low] + share * (cell->ocv_soc[high] - cell->ocv_soc[low]);
 }
 
-void family_begin(family_t *family, const family_constants_t *constants,
-                  const rcbf_constants_t *cell, float plug_in_soc, float voltage_V)
+static bool is_at_rest(const family_constants_t *constants, const family_reading_t *reading)
 {
-    const float error_V = constants->voltage_error_V + constants->ocv_error_V +
-                          constants->rest_polarisation_V +
-                          constants->current_error_A * constants->resistance_ohm[0];
+    return numeric_abs(reading->current_A) <= 2.0f * constants->current_error_A;
+}
+
+void family_begin(family_t *family, const family_constants_t *constants,
+                  const rcbf_constants_t *cell, float plug_in_soc,
+                  const family_reading_t *reading)
+{
     const float told_low = numeric_clamp(plug_in_soc - constants->plug_in_error, 0.0f, 1.0f);
     const float told_high = numeric_clamp(plug_in_soc + constants->plug_in_error, 0.0f, 1.0f);
-    const float seen_low = soc_at(cell, voltage_V - error_V);
-    const float seen_high = soc_at(cell, voltage_V + error_V);
-    float low = larger(told_low, seen_low);
-    float high = smaller(told_high, seen_high);
-    if (low > high) {
-        /* One of both is wrong; nobody knows which. */
-        low = smaller(told_low, seen_low);
-        high = larger(told_high, seen_high);
+    float low = told_low;
+    float high = told_high;
+    if (is_at_rest(constants, reading)) {
+        /* A charge that has just ended has left polarisation as well, which does not lower the
+         * voltage. */
+        const float error_V = constants->voltage_error_V + constants->ocv_error_V +
+                              constants->rest_polarisation_V +
+                              3.0f * constants->current_error_A * constants->resistance_ohm[0];
+        const float seen_low =
+            soc_at(cell, reading->voltage_V - error_V - family->polarisation_V);
+        const float seen_high = soc_at(cell, reading->voltage_V + error_V);
+        low = larger(told_low, seen_low);
+        high = smaller(told_high, seen_high);
+        if (low > high) {
+            /* One of both is wrong; nobody knows which. */
+            low = smaller(told_low, seen_low);
+            high = larger(told_high, seen_high);
+        }
     }
     family->soc_low = (soc_counter_t){ low, 0.0f };
     family->soc_high = (soc_counter_t){ high, 0.0f };
@@ -206,7 +219,9 @@ static float heat_now_W(const family_t *family, const family_constants_t *consta
 
 /* The core obeys C T' = heat - (T - Ts) / R + C nu, and the right-hand side is largest for the
  * greatest R where T is above Ts; so what rises as with the least C and falls as with the greatest
- * C stays above every core of the family. A fall is taken at its end, where it is slowest. */
+ * C stays above every core of the family. A core below its surface is warmed the more the smaller R
+ * is, so that the bound is no lower than the surface. A fall is taken at its end, where it is
+ * slowest. */
 static void follow_core(family_t *family, const family_constants_t *constants,
                         const rcbf_constants_t *cell, const family_reading_t *reading)
 {
@@ -216,6 +231,7 @@ static void follow_core(family_t *family, const family_constants_t *constants,
         larger(reading->surface_temperature_K, family->surface_temperature_K);
     const float surface_room_K = (cell->max_core_temperature_K.high_K - surface_K) +
                                  cell->max_core_temperature_K.low_K - constants->surface_error_K;
+    family->core_room_K = smaller(family->core_room_K, surface_room_K);
     const float disturbance_W =
         constants->disturbance_W +
         strength_A * (constants->disturbance_W_per_A +
@@ -227,76 +243,6 @@ static void follow_core(family_t *family, const family_constants_t *constants,
     family->heat_W = heat_W;
     family->surface_temperature_K = reading->surface_temperature_K;
     family->core_is_known = family->core_is_known && numeric_is_finite(family->core_room_K);
-}
-
-static void add_to(family_window_t *window, const family_reading_t *reading)
-{
-    const float surface_K = reading->surface_temperature_K;
-    if (window->count == 0u) {
-        *window = (family_window_t){ .first_K = surface_K };
-    }
-    window->count++;
-    window->sum_K += surface_K - window->first_K;
-    window->gap_K += surface_K - reading->coolant_temperature_K;
-}
-
-/* The surface's own balance tells the mean of the core over a time:
- *   Tc - Ts = Rc Cs (Ts' - nu) + (Rc / Rs) (Ts - Tinf)
- * and a core without current is no hotter than its mean, unless the surface is hotter still. */
-static void look_at_rest(family_t *family, const family_constants_t *constants,
-                         const rcbf_constants_t *cell, const family_reading_t *reading)
-{
-    family_window_t *window = &family->rest;
-    const float surface_K = reading->surface_temperature_K;
-    add_to(window, reading);
-    if (window->count < constants->rest_periods) {
-        return;
-    }
-    const float share = 1.0f / (float)window->count;
-    const float mean_K = window->first_K + share * window->sum_K;
-    const float above_K =
-        larger(0.0f, surface_K - window->first_K) * constants->per_surface_rise +
-        larger(0.0f, share * window->gap_K) * constants->per_coolant_gap;
-    const float heated_K = (float)window->count * constants->heating_K_per_W * family->heat_W;
-    const float hottest_K =
-        larger(surface_K, mean_K + above_K) + constants->rest_error_K + larger(0.0f, heated_K);
-    const float room_K = (cell->max_core_temperature_K.high_K - hottest_K) +
-                         cell->max_core_temperature_K.low_K;
-    if (!family->core_is_known || (room_K > family->core_room_K)) {
-        family->core_room_K = room_K;
-        family->core_is_known = numeric_is_finite(room_K);
-    }
-    window->count = 0u;
-}
-
-/* A surface that says that the core is hotter than the measured heat can have made it contradicts the
- * voltage or itself. The hotter one is believed. */
-static void look_in_charge(family_t *family, const family_constants_t *constants,
-                           const rcbf_constants_t *cell, const family_reading_t *reading)
-{
-    family_window_t *window = &family->charge;
-    add_to(window, reading);
-    if (window->count < constants->charge_periods) {
-        return;
-    }
-    const float share = 1.0f / (float)window->count;
-    const float rise_K = reading->surface_temperature_K - window->first_K;
-    const float per_rise = (rise_K > 0.0f) ? constants->least_per_surface_rise
-                                           : constants->most_per_surface_fall;
-    const float gap_K = share * window->gap_K;
-    const float least_K = window->first_K + share * window->sum_K + rise_K * per_rise +
-                          gap_K * constants->least_per_coolant_gap - constants->charge_error_K;
-    const float room_K = (cell->max_core_temperature_K.high_K - least_K) +
-                         cell->max_core_temperature_K.low_K;
-    if ((gap_K > 0.0f) && (room_K < family->core_room_K)) {
-        family->core_room_K = room_K;
-    }
-    window->count = 0u;
-}
-
-static bool is_at_rest(const family_constants_t *constants, const family_reading_t *reading)
-{
-    return numeric_abs(reading->current_A) <= 2.0f * constants->current_error_A;
 }
 
 /* What resistance and polarisation cannot explain of the voltage is open-circuit voltage. */
@@ -313,7 +259,7 @@ static void look_for_full(family_t *family, const family_constants_t *constants,
 }
 
 /* Without readings the core takes up all the heat that the strongest possible current can make; for
- * a few periods only, since the reaction to missing readings is 0 A and nothing is known for long. */
+ * a few periods only, since the reaction to missing readings is 0 A and nothing is known long. */
 static void bridge(family_t *family, const family_constants_t *constants)
 {
     family->bridged++;
@@ -357,61 +303,13 @@ void family_observe(family_t *family, const family_constants_t *constants,
     look_for_full(family, constants, reading);
     if (is_at_rest(constants, reading)) {
         follow_core(family, constants, cell, reading);
-        look_at_rest(family, constants, cell, reading);
+        family_look_at_rest(family, constants, cell, reading);
         family->charge.count = 0u;
     } else if (reading->is_charging) {
         follow_core(family, constants, cell, reading);
-        look_in_charge(family, constants, cell, reading);
+        family_look_in_charge(family, constants, cell, reading);
         family->rest.count = 0u;
     } else {
         forget_after_load(family, constants);
     }
-}
-
-bool family_is_full(const family_t *family, const family_constants_t *constants,
-                    float completion_soc)
-{
-    return (family->soc_known && (family->soc_low.soc >= completion_soc)) ||
-           (family->full_count >= constants->full_periods);
-}
-
-float family_core_room_K(const family_t *family, const family_constants_t *constants,
-                         const rcbf_constants_t *cell, const family_reading_t *reading)
-{
-    const float estimated_room_K =
-        (cell->max_core_temperature_K.high_K - reading->estimated_core_K) +
-        cell->max_core_temperature_K.low_K - constants->estimate_error_K;
-    /* An estimate that is no number leaves what the observer knows. */
-    return (estimated_room_K > family->core_room_K) ? estimated_room_K : family->core_room_K;
-}
-
-bool family_is_too_hot(const family_t *family, const family_constants_t *constants,
-                       const rcbf_constants_t *cell, const family_reading_t *reading,
-                       float overshoot_K)
-{
-    return family->core_is_known && !is_at_rest(constants, reading) &&
-           (family_core_room_K(family, constants, cell, reading) < -overshoot_K);
-}
-
-bool family_supply_is_plausible(const family_t *family, const family_constants_t *constants,
-                                float current_A, float deviation_A)
-{
-    const float strength_A = -current_A;
-    const float low_A = family->supply_low_A * (1.0f - constants->supply_tolerance);
-    const float high_A = family->supply_high_A * (1.0f + constants->supply_tolerance);
-    return (strength_A >= low_A - deviation_A) && (strength_A <= high_A + deviation_A);
-}
-
-bool family_voltage_is_plausible(const family_t *family, const family_constants_t *constants,
-                                 const rcbf_constants_t *cell, const family_reading_t *reading,
-                                 float deviation_V)
-{
-    const family_heat_t heat = family_heat(family, constants, reading);
-    const float spread_V = constants->ocv_error_V + family->rest_polarisation_V + deviation_V;
-    const float low_V = rcbf_open_circuit_voltage_V(cell, family->soc_low.soc) +
-                        heat.least_resistance_ohm * heat.at_least_A - spread_V;
-    const float high_V = rcbf_open_circuit_voltage_V(cell, family->soc_high.soc) +
-                         heat.resistance_ohm * heat.at_most_A +
-                         family->polarisation_V + spread_V;
-    return (reading->voltage_V >= low_V) && (reading->voltage_V <= high_V);
 }

@@ -71,13 +71,13 @@ float family_mapped_A(const family_map_t *map, float temperature_K, float soc)
 
 /* With V_i of the branches and W the larger of a and past_A, V_i <= R_i W, so that
  *   heat = R0 a^2 + sum V_i^2 / R_i <= R0 a^2 + W sum V_i = W eta + R0 (a^2 - W a_m)
- * where eta is the overpotential at a_m. For each of the terms the worst R0 is an end. */
+ * where eta is the overpotential at a_m. The worst a_m is the least, the worst R0 an end. */
 float family_measured_heat_W(const family_heat_t *heat, float strength_A)
 {
     const float past_A = larger(strength_A, heat->past_A);
     const float squared = strength_A * strength_A;
     const float more = heat->resistance_ohm * (squared - past_A * heat->at_least_A);
-    const float less = heat->least_resistance_ohm * (squared - past_A * heat->at_most_A);
+    const float less = heat->least_resistance_ohm * (squared - past_A * heat->at_least_A);
     return past_A * heat->overpotential_V + larger(more, less);
 }
 
@@ -111,7 +111,7 @@ float family_measured_strength_A(const family_heat_t *heat, float square, float 
                limit_W - past_A * (eta_V - heat->resistance_ohm * heat->at_least_A));
     const float less_A =
         root_A(heat->least_resistance_ohm + square, slope,
-               limit_W - past_A * (eta_V - heat->least_resistance_ohm * heat->at_most_A));
+               limit_W - past_A * (eta_V - heat->least_resistance_ohm * heat->at_least_A));
     return smaller(grown_A, smaller(more_A, less_A));
 }
 
@@ -171,8 +171,8 @@ bool family_constants_are_valid(const family_constants_t *k)
     const float positive[] = { k->least_soc_per_A,  k->greatest_soc_per_A, k->hold_soc_per_A,
                                k->coldest_K,        k->per_step_K,         k->least_resistance_ohm,
                                k->outflow_W_per_K,  k->core_K_per_J,       k->heating_K_per_W,
-                               k->cooling_K_per_W,  k->coldest_core_K,     k->hold_s,           k->period_s,
-                               k->full_ocv_V,       k->estimate_error_K };
+                               k->cooling_K_per_W,  k->coldest_core_K,     k->hold_s,
+                               k->period_s,         k->full_ocv_V,       k->estimate_error_K };
     const float not_negative[] = { k->plug_in_error,        k->ocv_error_V,
                                    k->polarisation_ohm,     k->rest_polarisation_V,
                                    k->rest_drift_per_s,     k->inner_K,

@@ -1,4 +1,4 @@
-/* What the tables of a family say; shared by observer and decision. */
+/* What the sources of a family share: tables, bounds on the heat, and what the surface tells. */
 #ifndef FAMILY_TABLES_H
 #define FAMILY_TABLES_H
 
@@ -42,5 +42,11 @@ float family_measured_strength_A(const family_heat_t *heat, float square, float 
                                  float limit_W);
 float family_assumed_strength_A(const family_heat_t *heat, float square, float slope,
                                 float limit_W);
+
+/* Take one more reading at rest, or in a charge, into the bound on the core. */
+void family_look_at_rest(family_t *family, const family_constants_t *constants,
+                         const rcbf_constants_t *cell, const family_reading_t *reading);
+void family_look_in_charge(family_t *family, const family_constants_t *constants,
+                           const rcbf_constants_t *cell, const family_reading_t *reading);
 
 #endif

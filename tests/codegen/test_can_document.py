@@ -57,11 +57,12 @@ def test_every_fault_has_its_policy_and_a_meaning() -> None:
     rows, policies = table("## Fault bits"), lib.host_fault_policies()
     assert list(rows) == [str(fault) for fault in range(lib.FAULT_COUNT)]
     for number, symbol in ffi.typeof("fault_t").elements.items():
-        _, name, meaning, at_once, periods = rows[str(number)]
+        _, name, meaning, at_once, periods, *returns = rows[str(number)]
         assert name.upper().replace(" ", "_") == symbol.removeprefix("FAULT_")
         assert meaning
         assert at_once == ("yes" if policies[number].stops_at_once else "no")
         assert int(periods) == policies[number].debounce_periods
+        assert int(returns[0] if returns else 0) == policies[number].returns
 
 
 def test_the_document_names_the_version_of_the_database() -> None:

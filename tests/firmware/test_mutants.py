@@ -52,7 +52,7 @@ MUTANTS = [
     Mutant("faults are seen while filters settle", "bms.c", "symptoms & ~bit_if(true, FAULT_OUT_OF_DOMAIN)", "0u", HISTORY, "faults_are_seen"),
     Mutant("a gap starts the history anew", "history.c", "bridged > HISTORY_MAX_BRIDGED", "bridged > 9999u", HISTORY, "gap"),
     Mutant("filters are deaf to what is no number", "history.c", "is_usable && numeric_is_finite(current_A) &&", "is_usable ||", HISTORY, "bridged"),
-    Mutant("a surface colder than the heat allows is a fault", "bms.c", "limits->surface_deficit_K),", "9999.0f),", FAULTS, "colder"),
+    Mutant("a surface colder than the heat allows is a fault", "bms_symptoms.c", "limits->surface_deficit_K),", "9999.0f),", FAULTS, "colder"),
     Mutant("the prediction warms with the current", "thermal.c", "constants->gain_K_per_W[0] * heat_W", "0.0f * heat_W", THERMAL, "undisturbed"),
     Mutant("the prediction's error is granted", "thermal.c", " - constants->error_bound_K", "", THERMAL, "within_the_modelled"),
     Mutant("the heat stands in for a sensor that reads cold", "bms.c", "bms->surface_temperature_K = coldest_K;", "(void)0;", STATES, "stands_in"),
@@ -74,7 +74,7 @@ MUTANTS = [
     Mutant("a charge needs the edge", "bms.c", "bms->may_start && (symptoms", "(symptoms", STATES, "edge"),
     Mutant("a charge ends when complete", "bms.c", "bms->state = BMS_COMPLETE;", "bms->state = BMS_CHARGING;", STATES, "complete"),
     Mutant("the command is counted too", "soc.c", "? state->commanded.soc", "? state->measured.soc", STATES, "counted"),
-    Mutant("a fault outlives its symptom", "monitor.c", "monitor->latched |= bit;", "monitor->latched = bit & symptoms;", FAULTS, "whatever_other"),
+    Mutant("a fault outlives its symptom", "monitor.c", "monitor->latched |= (uint32_t)1u << fault;", "monitor->latched = (uint32_t)1u << fault & monitor->active;", FAULTS, "whatever_other"),
     Mutant("commands are rounded towards zero", "codec.c", "(rounding == CODEC_TOWARDS_ZERO) ? STEP_TOLERANCE : 0.5f", "0.5f", "tests/firmware/test_codec.py", "towards_zero"),
 ]  # fmt: skip
 
