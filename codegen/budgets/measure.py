@@ -107,10 +107,11 @@ def _stack(graph: CallGraph, functions: Iterable[str]) -> int:
 
 
 def _tables(path: Path, cross: str) -> list[str]:
+    # nm would list what the link is to optimise, without what a module keeps to itself.
     listing = subprocess.run(
-        [f"{cross}nm", path], capture_output=True, text=True, check=True
+        [f"{cross}readelf", "-sW", path], capture_output=True, text=True, check=True
     ).stdout
-    return [fields[2] for line in listing.splitlines() if (fields := line.split())[-2] in "RrDd"]
+    return [fields[7] for line in listing.splitlines() if "OBJECT" in (fields := line.split())]
 
 
 def _module(path: Path) -> str:

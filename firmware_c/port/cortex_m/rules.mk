@@ -75,6 +75,7 @@ $(BUILD)/unsealed.elf: $(APPLICATION_OBJECTS) $(BUILD)/boot_image.o $F/linker/ap
   $F/linker/memory.ld $F/linker/ram.ld
 	@$(CROSS)gcc $(LINK_WHOLE) $(LDFLAGS) -T application.ld -Wl,-Map=$(BUILD)/firmware.map \
 	  $(APPLICATION_OBJECTS) $(BUILD)/boot_image.o -lm -o $@
+	@sed -i 's|[^ ]*\(\.ltrans[0-9]*\.ltrans\.o\)|whole\1|' $(BUILD)/firmware.map
 
 # Erased flash reads as ones.
 $(BUILD)/unsealed.bin: $(BUILD)/unsealed.elf
