@@ -11,9 +11,27 @@ from pathlib import Path
 from bms.errors import InputError
 
 _NODE = re.compile(r'^node: \{ title: "(?P<title>[^"]+)" label: "(?P<label>[^"]*)"')
+_SOURCE = re.compile(r"\\n(?P<file>[^:\\]+\.[ch]):\d+:\d+")
+_LINKED = re.compile(r'"[^"]*\.ltrans\d+\.o:(?=[^"]+")')
 _EDGE = re.compile(r'^edge: \{ sourcename: "(?P<caller>[^"]+)" targetname: "(?P<callee>[^"]+)"')
 _FRAME = re.compile(r"\\n(?P<bytes>\d+) bytes \((?P<kind>[^)]+)\)")
 _INDIRECT = "__indirect_call"
+
+
+def defined_functions(path: Path) -> dict[str, str]:
+    """Name -> source file of each function that the compiler made code for, from a .ci file."""
+    found = (_NODE.match(line) for line in lines_of(path))
+    return {
+        node["title"]: source["file"]
+        for node in found
+        if node and _FRAME.search(node["label"]) and (source := _SOURCE.search(node["label"]))
+    }
+
+
+def lines_of(path: Path) -> list[str]:
+    """Lines of a .ci file. Functions that were optimised together at the link have their names in
+    the assembler, without the temporary file that the compiler gives them."""
+    return _LINKED.sub('"', path.read_text(encoding="utf-8")).splitlines()
 
 
 @dataclass
@@ -59,7 +77,7 @@ def read_call_graph(
     """
     graph = CallGraph(frames=dict(library_frames))
     through_pointers = set()
-    for line in (line for path in files for line in path.read_text(encoding="utf-8").splitlines()):
+    for line in (line for path in files for line in lines_of(path)):
         if (node := _NODE.match(line)) and (frame := _FRAME.search(node["label"])):
             if frame["kind"] != "static":
                 raise InputError(f"stack: frame of {node['title']} has no fixed size")
@@ -75,5 +93,10 @@ def read_call_graph(
             "differ; name the callees under [indirect_calls] of firmware_c/budgets.toml"
         )
     for caller, callees in indirect.items():
-        graph.callees[caller].update(callees)
+        graph.callees[caller].update(_in_whole(callee, graph.frames) for callee in callees)
     return graph
+
+
+def _in_whole(function: str, frames: Mapping[str, int]) -> str:
+    """Name of a declared function: static ones of what was optimised as a whole have no file."""
+    return function if function in frames else function.rpartition(":")[2]

@@ -6,6 +6,13 @@
 #include "can_db.h"
 #include "numeric.h"
 
+/* The bound of the stack knows by the caller's name what it may call through a pointer. */
+#if defined(__GNUC__)
+#define CODEC_APART __attribute__((noinline))
+#else
+#define CODEC_APART
+#endif
+
 /* Share of a step by which float32 may miss a value that lies exactly on a step. */
 #define STEP_TOLERANCE 0.02f
 /* More than any signal has; float32 holds every whole number up to there. */
@@ -195,7 +202,7 @@ static void write_command(const codec_report_t *report, uint8_t *data)
     (void)can_db_charge_command_pack(data, &message, CAN_DB_CHARGE_COMMAND_LENGTH);
 }
 
-void codec_write(uint32_t index, const codec_report_t *report, can_frame_t *frame)
+CODEC_APART void codec_write(uint32_t index, const codec_report_t *report, can_frame_t *frame)
 {
     static void (*const WRITE[CAN_TRANSMITTED_COUNT])(const codec_report_t *, uint8_t *) = {
         [CAN_TRANSMITTED_ESTIMATE] = write_estimate,

@@ -28,9 +28,7 @@ from tests.firmware.ports import image, needs_compiler
 pytestmark = needs_compiler
 
 SOURCES = [FIRMWARE / "image" / "image.c"]
-HEADERS = [
-    f"include/{name}.h" for name in ("kan", "rcbf", "thermal", "soc", "family", "calibration")
-]
+HEADERS = [f"include/{name}.h" for name in ("kan", "rcbf", "thermal", "calibration")]
 HEADERS.append("image/image.h")
 SAMPLE = 1500
 

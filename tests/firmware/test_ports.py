@@ -124,8 +124,8 @@ def test_a_section_without_a_place_fails_the_build(tmp_path: Path) -> None:
     """The linker would put it somewhere, outside the checksums."""
     shutil.copytree(ROOT / "firmware_c", tmp_path / "firmware_c")
     source, function = (
-        tmp_path / "firmware_c" / "src" / "calibration.c",
-        "bool calibration_is_valid(",
+        tmp_path / "firmware_c" / "src" / "bms.c",
+        "bool bms_transmit(",
     )
     text = source.read_text()
     assert function in text

@@ -69,12 +69,13 @@ def symbols(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, str, st
     return found
 
 
+PREFIXES = {"calibration_default": "bms"}
+
+
 def test_exported_symbols_carry_their_module_s_prefix(symbols: list[tuple[str, str, str]]) -> None:
     for module, kind, name in symbols:
         if kind in "TDRB":
-            prefix = {"calibration_default": "bms", "can_catalog": "can"}.get(module, module)
-            if module.startswith(("family_", "bms_")):  # one module in several files
-                prefix = module.split("_")[0]
+            prefix = PREFIXES.get(module, module.partition("_")[0])
             assert name.lower().startswith(prefix), f"{module}: {name}"
 
 

@@ -11,21 +11,28 @@ WARNINGS := -pedantic -Wall -Wextra -Werror -Wconversion -Wdouble-promotion -Wmi
 NUMERICS := -ffp-contract=off -fno-math-errno
 # Whoever builds anywhere gets the same bytes.
 REPRODUCIBLE := "-ffile-prefix-map=$(CURDIR)=." -g0
+SECTIONS := -ffunction-sections -fdata-sections -fcallgraph-info=su
 CFLAGS := -std=c99 -Os -mthumb $(CPU) $(WARNINGS) $(NUMERICS) $(REPRODUCIBLE) \
-  -ffunction-sections -fdata-sections -fcallgraph-info=su -MMD \
+  $(SECTIONS) -MMD \
   -DPORT_TARGET=$(TARGET_ID)u \
   -I$F/include -I$F/src -I$F/generated -I$F/image -I$F/boot -I$F/port -I$F/port/cortex_m
+# The core is optimised as a whole; not with its calibration, which can be replaced, and not with
+# the port around it. What is called once stays a function, so that each module has its size.
+WHOLE := -flto -ffat-lto-objects -fno-inline-functions-called-once
+LINK_WHOLE := $(CFLAGS) -flto -flto-partition=one
 # Where the processor has no square root: the C library's own, without the wrapper that sets errno.
 LDFLAGS := $(CPU) -mthumb -nostartfiles --specs=nano.specs -L$F/linker \
   -Wl,--gc-sections -Wl,--fatal-warnings -Wl,--orphan-handling=error -Wl,--build-id=none \
   -Wl,--defsym=sqrtf=__ieee754_sqrtf
 
-APPLICATION_SOURCES := $(wildcard $F/src/*.c $F/generated/*.c $F/port/*.c) \
+CORE_SOURCES := $(wildcard $F/src/*.c $F/generated/can_*.c)
+APPLICATION_SOURCES := $(CORE_SOURCES) $F/generated/calibration_default.c $(wildcard $F/port/*.c) \
   $(addprefix $F/port/cortex_m/, startup.c port.c main.c application_header.c calibration_header.c)
 BOOT_SOURCES := $F/src/codec.c $F/src/e2e.c $F/generated/can_catalog.c $F/generated/can_db.c \
   $(wildcard $F/image/*.c $F/boot/*.c) $F/port/slcan.c \
   $(addprefix $F/port/cortex_m/, startup.c boot.c)
 APPLICATION_OBJECTS := $(APPLICATION_SOURCES:%.c=$(BUILD)/application/%.o)
+CORE_OBJECTS := $(CORE_SOURCES:%.c=$(BUILD)/application/%.o)
 BOOT_OBJECTS := $(BOOT_SOURCES:%.c=$(BUILD)/boot/%.o)
 PARTS := application_header calibration_header
 
@@ -41,6 +48,8 @@ budgets: $(BUILD)/firmware.elf $(BUILD)/sizes.o
 $(BUILD)/sizes.o: $(wildcard $F/include/*.h)
 	@printf '#include "bms.h"\nextern char state[]; char state[sizeof(bms_t)];\n' | \
 	  $(CROSS)gcc $(CFLAGS) -x c -c - -o $@
+
+$(CORE_OBJECTS): CFLAGS += $(WHOLE)
 
 $(BUILD)/application/%.o: %.c $(RULES)
 	@mkdir -p $(@D)
@@ -64,8 +73,9 @@ $(BUILD)/boot_image.o: $F/port/cortex_m/boot_image.S $(BUILD)/boot.bin
 
 $(BUILD)/unsealed.elf: $(APPLICATION_OBJECTS) $(BUILD)/boot_image.o $F/linker/application.ld \
   $F/linker/memory.ld $F/linker/ram.ld
-	@$(CROSS)gcc $(LDFLAGS) -T application.ld -Wl,-Map=$(BUILD)/firmware.map \
+	@$(CROSS)gcc $(LINK_WHOLE) $(LDFLAGS) -T application.ld -Wl,-Map=$(BUILD)/firmware.map \
 	  $(APPLICATION_OBJECTS) $(BUILD)/boot_image.o -lm -o $@
+	@sed -i 's|[^ ]*\(\.ltrans[0-9]*\.ltrans\.o\)|whole\1|' $(BUILD)/firmware.map
 
 # Erased flash reads as ones.
 $(BUILD)/unsealed.bin: $(BUILD)/unsealed.elf
@@ -90,6 +100,6 @@ COST_OBJECTS := $(patsubst %.c,$(BUILD)/application/%.o, \
   $(wildcard $F/src/*.c $F/generated/*.c $F/cost/*.c) $F/port/cortex_m/startup.c)
 
 $(BUILD)/cost.elf: $(COST_OBJECTS) $F/linker/cost.ld $F/linker/ram.ld
-	@$(CROSS)gcc $(LDFLAGS) -T cost.ld $(COST_OBJECTS) -lm -o $@
+	@$(CROSS)gcc $(LINK_WHOLE) $(LDFLAGS) -T cost.ld $(COST_OBJECTS) -lm -o $@
 
 -include $(sort $(APPLICATION_OBJECTS:.o=.d) $(BOOT_OBJECTS:.o=.d) $(COST_OBJECTS:.o=.d))
