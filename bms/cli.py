@@ -16,8 +16,9 @@ from typer.exceptions import Abort, TyperException
 from typer.main import get_command, get_group
 
 from bms.errors import BmsError
+from bms.interruption import EXIT_INTERRUPTED, INTERRUPTED, prompt_interrupts
 
-EXIT_DONE, EXIT_CHECK_FAILED, EXIT_WRONG_USE, EXIT_INTERRUPTED = 0, 1, 2, 130
+EXIT_DONE, EXIT_CHECK_FAILED, EXIT_WRONG_USE = 0, 1, 2
 
 
 class _LazyCommand(TyperCommand):
@@ -76,7 +77,10 @@ def main() -> None:
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     try:
-        code = application(sys.argv[1:])(standalone_mode=False)
+        with prompt_interrupts():
+            code = application(sys.argv[1:])(standalone_mode=False)
+            if code == EXIT_INTERRUPTED:  # what becomes of KeyboardInterrupt in typer
+                raise KeyboardInterrupt
     except BmsError as error:
         print(f"bms: {error}", file=sys.stderr)
         sys.exit(EXIT_WRONG_USE)
@@ -85,6 +89,6 @@ def main() -> None:
         print(f"bms: {reason}; see 'bms --help'", file=sys.stderr)
         sys.exit(EXIT_WRONG_USE)
     except (KeyboardInterrupt, Abort):
-        print("bms: interrupted", file=sys.stderr)
+        print(INTERRUPTED, file=sys.stderr)
         sys.exit(EXIT_INTERRUPTED)
     sys.exit(code if isinstance(code, int) else EXIT_DONE)
