@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import logging
 import os
 import sys
 from importlib.abc import InspectLoader
@@ -76,6 +77,8 @@ def main() -> None:
     # The matrices here are small: threads of the linear algebra would only wait for each other.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
+    # It tells of its own caches, for example where the home folder cannot be written.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     try:
         with prompt_interrupts():
             code = application(sys.argv[1:])(standalone_mode=False)
@@ -87,6 +90,11 @@ def main() -> None:
     except TyperException as error:
         reason = error.format_message().rstrip(".") or "no command given"
         print(f"bms: {reason}; see 'bms --help'", file=sys.stderr)
+        sys.exit(EXIT_WRONG_USE)
+    except OSError as error:  # a path of the user's, for whose look-up no command has words
+        where = "" if error.filename is None else f"{error.filename}: "
+        reason = error.strerror or str(error)
+        print(f"bms: {where}{reason}; choose a file or folder that you may use", file=sys.stderr)
         sys.exit(EXIT_WRONG_USE)
     except (KeyboardInterrupt, Abort):
         print(INTERRUPTED, file=sys.stderr)
