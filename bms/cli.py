@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import logging
 import os
 import sys
 from importlib.abc import InspectLoader
@@ -16,8 +17,9 @@ from typer.exceptions import Abort, TyperException
 from typer.main import get_command, get_group
 
 from bms.errors import BmsError
+from bms.interruption import EXIT_INTERRUPTED, INTERRUPTED, prompt_interrupts
 
-EXIT_DONE, EXIT_CHECK_FAILED, EXIT_WRONG_USE, EXIT_INTERRUPTED = 0, 1, 2, 130
+EXIT_DONE, EXIT_CHECK_FAILED, EXIT_WRONG_USE = 0, 1, 2
 
 
 class _LazyCommand(TyperCommand):
@@ -75,8 +77,13 @@ def main() -> None:
     # The matrices here are small: threads of the linear algebra would only wait for each other.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
+    # It tells of its own caches, for example where the home folder cannot be written.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     try:
-        code = application(sys.argv[1:])(standalone_mode=False)
+        with prompt_interrupts():
+            code = application(sys.argv[1:])(standalone_mode=False)
+            if code == EXIT_INTERRUPTED:  # what becomes of KeyboardInterrupt in typer
+                raise KeyboardInterrupt
     except BmsError as error:
         print(f"bms: {error}", file=sys.stderr)
         sys.exit(EXIT_WRONG_USE)
@@ -84,7 +91,12 @@ def main() -> None:
         reason = error.format_message().rstrip(".") or "no command given"
         print(f"bms: {reason}; see 'bms --help'", file=sys.stderr)
         sys.exit(EXIT_WRONG_USE)
+    except OSError as error:  # a path of the user's, for whose look-up no command has words
+        where = "" if error.filename is None else f"{error.filename}: "
+        reason = error.strerror or str(error)
+        print(f"bms: {where}{reason}; choose a file or folder that you may use", file=sys.stderr)
+        sys.exit(EXIT_WRONG_USE)
     except (KeyboardInterrupt, Abort):
-        print("bms: interrupted", file=sys.stderr)
+        print(INTERRUPTED, file=sys.stderr)
         sys.exit(EXIT_INTERRUPTED)
     sys.exit(code if isinstance(code, int) else EXIT_DONE)

@@ -6,6 +6,7 @@ of the message's 16 data ids that the CRC covers too; docs/can.md lists them.
 
 from __future__ import annotations
 
+import time
 from itertools import cycle
 from pathlib import Path
 
@@ -57,9 +58,11 @@ class ProtectedBus:
 
         A signal is None where its sender has no value: the code lies above the signal's range.
         """
-        while (frame := self._bus.recv(timeout_s)) is not None:
+        end_s = time.monotonic() + timeout_s
+        while (frame := self._bus.recv(max(0.0, end_s - time.monotonic()))) is not None:
             message = self._heard.get(frame.arbitration_id)
-            if message is None or not self._is_intact_and_new(message, frame.data):
+            is_data = not (frame.is_remote_frame or frame.is_error_frame or frame.is_extended_id)
+            if message is None or not (is_data and self._is_intact_and_new(message, frame.data)):
                 continue
             values = message.decode(frame.data)
             for signal in message.signals:

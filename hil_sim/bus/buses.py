@@ -5,6 +5,9 @@ from __future__ import annotations
 import logging
 import shlex
 import socket
+import time
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,12 +16,16 @@ from can.interfaces.socketcan import SocketcanBus
 
 from bms.errors import BusError, InputError
 from hil_sim.bus.closing import Closing
+from hil_sim.bus.deadline import Deadline
+from hil_sim.bus.foreign import ForeignFrame, foreign_kind, is_unreadable
 from hil_sim.bus.slcan import SCHEME, SlcanSocketBus
 
 GUEST = Path(__file__).with_name("vcan_guest.sh")
 """Runs a command where vcan0 exists, also on a kernel without CAN."""
 RECEIVE_BUFFER_BYTES = 1 << 20
 _STANDARD_FRAMES = [{"can_id": 0, "can_mask": 0, "extended": False}]
+_MOST_LATE_FOREIGN = 1000
+"""Foreign frames that are skipped after the deadline, for what came before it and waits behind."""
 
 # udp_multicast: one hop more would send the frames out of the machine's network card.
 # slcan: an adapter needs no start-up time unless it has a boot loader of its own.
@@ -26,6 +33,9 @@ _QUIRKS: dict[str, dict[str, Any]] = {
     "udp_multicast": {"hop_limit": 0},
     "slcan": {"sleep_after_open": 0.0, "timeout": 0.001, "bitrate": 500_000},
 }
+# The kernel keeps extended frames from the nodes. Elsewhere python-can would filter, and takes a
+# foreign frame for the end of a wait of 0 s.
+_NODE_OPTIONS: dict[str, dict[str, Any]] = {"socketcan": {"can_filters": _STANDARD_FRAMES}}
 
 # What an adapter has to say when it cannot be opened is in the exception already.
 logging.getLogger("can").addHandler(logging.NullHandler())
@@ -48,11 +58,16 @@ class _Message(can.Message):
 
 
 class CanBus(Closing):
-    """An open bus; frames other than classical 11-bit data frames are not seen."""
+    """An open bus; frames other than classical 11-bit data frames are counted and skipped."""
 
-    def __init__(self, name: str, bus: can.BusABC) -> None:
+    def __init__(
+        self, name: str, bus: can.BusABC, clock_s: Callable[[], float] = time.monotonic
+    ) -> None:
         self.name = name
         self._bus = bus
+        self._clock_s = clock_s
+        self.foreign = Counter[ForeignFrame]()
+        """What came of other kinds, as far as the interface hands it over."""
 
     def send(self, frame: Frame) -> None:
         """Put a frame on the bus; BusError when the bus does not take it."""
@@ -63,13 +78,19 @@ class CanBus(Closing):
             raise BusError(f"bus '{self.name}': cannot send: {one_line(error)}") from None
 
     def receive(self, timeout_s: float) -> Frame | None:
-        """The next frame of another party, or None after timeout_s; BusError when the bus fails."""
-        try:
-            while (message := self._bus.recv(timeout_s)) is not None:
-                if not (message.is_remote_frame or message.is_error_frame or message.is_fd):
-                    return Frame(message.arbitration_id, bytes(message.data))
-        except (can.CanError, OSError) as error:
-            raise BusError(f"bus '{self.name}': cannot receive: {one_line(error)}") from None
+        """The next frame of another party, or None after timeout_s; BusError when the bus fails.
+
+        Foreign frames do not prolong the wait.
+        """
+        deadline = Deadline(timeout_s, self._clock_s)
+        late = 0
+        while late < _MOST_LATE_FOREIGN:
+            left_s = deadline.left_s
+            heard = next_heard(self.name, self._bus, left_s)
+            if not isinstance(heard, ForeignFrame):
+                return heard
+            self.foreign[heard] += 1
+            late += left_s == 0.0
         return None
 
     def close(self) -> None:
@@ -77,12 +98,29 @@ class CanBus(Closing):
         self._bus.shutdown()
 
 
+def next_heard(name: str, bus: can.BusABC, timeout_s: float) -> Frame | ForeignFrame | None:
+    """What comes next from a bus, or None after timeout_s; BusError when the bus fails.
+
+    One datagram or line that is no frame does not end a node.
+    """
+    try:
+        message = bus.recv(timeout_s)
+    except (can.CanError, OSError, ValueError, LookupError) as error:
+        if is_unreadable(error):
+            return ForeignFrame.UNREADABLE
+        raise BusError(f"bus '{name}': cannot receive: {one_line(error)}") from None
+    if message is None:
+        return None
+    return foreign_kind(message) or Frame(message.arbitration_id, bytes(message.data))
+
+
 def open_bus(name: str) -> CanBus:
     """Open a bus such as virtual:bms, socketcan:vcan0 or slcan:socket://127.0.0.1:5000.
 
     Raises BusError in one line with a remedy when the name or the bus behind it is no good.
     """
-    return CanBus(name, open_interface(name, can_filters=_STANDARD_FRAMES))
+    options = _NODE_OPTIONS.get(name.partition(":")[0], {})
+    return CanBus(name, open_interface(name, **options))
 
 
 def open_interface(name: str, **options: Any) -> can.BusABC:

@@ -11,6 +11,7 @@ from bms.commands.options import ModelOption, PresetOption
 from bms.firmware import Ecu
 from bms.presets import DEFAULT_PRESET
 from hil_sim.bus.buses import open_bus, require_shared
+from hil_sim.bus.foreign import counts_text
 from hil_sim.commands import options
 from hil_sim.commands.stopping import stop_event
 from hil_sim.nodes.clock import WallClock
@@ -49,7 +50,8 @@ def ecu(
             node.run_on_clock(period_s, WallClock(), silence_s, stop.is_set)
         else:
             node.run(silence_s, stop.is_set)
-    print(f"ECU on {bus}: {node.frames} frames received, {node.steps} steps")
+    others = f"; foreign: {counts_text(connection.foreign)}" if connection.foreign else ""
+    print(f"ECU on {bus}: {node.frames} frames received, {node.steps} steps{others}")
     if node.slots is not None and node.slots.late_s:
         print(_punctuality(node.slots))
     return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Protocol
@@ -70,8 +71,9 @@ def charge_and_report(
     """Run a charge, and a baseline beside it; print and write what came of it.
 
     `log` is one more recording of the controller's bus, in the format of its suffix. Returns the
-    exit code: 1 when the controller, not the baseline, failed its check. Raises InputError before
-    the run when the folder or the log cannot be written.
+    exit code: 1 when the controller, not the baseline, failed its check, or when its time ended
+    before the charge did. Raises InputError before the run when the folder or the log cannot be
+    written.
     """
     with ExitStack() as stack:
         folder = stack.enter_context(OutputFolder(out)) if out is not None else None
@@ -96,7 +98,10 @@ def charge_and_report(
         print(json.dumps(summary_json(results), indent=2))
     else:
         print_table(Console(), settings, results, out)
-    return EXIT_DONE if results[0].summary.passed else EXIT_CHECK_FAILED
+    summary = results[0].summary
+    if summary.shortfall is not None:
+        print(f"bms: {summary.controller}: {summary.shortfall}; see --max-time-s", file=sys.stderr)
+    return EXIT_DONE if summary.passed and summary.shortfall is None else EXIT_CHECK_FAILED
 
 
 def _followed(settings: Settings, run: Run, recorder: Recorder | None) -> RunResult:

@@ -40,7 +40,7 @@ def plant(
     Measurements, then SYNC start each control period, and the plant waits for the charge command;
     with --realtime it sends no SYNC and waits for nobody. Temperatures in K, currents in A
     (negative while charging), times in s from the start of the charge. Exit code 1 when a limit is
-    crossed or the charge fails.
+    crossed, or the charge fails or does not end in time.
 
     Example: bms plant --bus socketcan:vcan0 --seed 1 --out out/run
     """

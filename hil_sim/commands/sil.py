@@ -57,7 +57,8 @@ def sil(
     in QEMU: nothing of it runs here, and it has to name the given preset and model.
     Temperatures in K, currents in A (negative while charging), times in s from the start of the
     charge. The S-CBF baselines know the true state of the cell, as their method assumes; all others
-    see the bus only. Exit code 1 when the controller lets a limit be crossed or the charge fails.
+    see the bus only. Exit code 1 when the controller lets a limit be crossed, or the charge fails
+    or does not end in time.
 
     Example: bms sil --baseline s-cbf --disturbance bang-bang --out out/run
     """

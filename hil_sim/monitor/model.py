@@ -10,9 +10,9 @@ from hil_sim.bus.buses import Frame
 from hil_sim.bus.catalog import Message
 from hil_sim.bus.database import MessageCodec, Values
 from hil_sim.bus.fault_bits import FaultBits
+from hil_sim.bus.foreign import ForeignFrame
 from hil_sim.bus.identity import Identity
 from hil_sim.bus.refusal import refusal_text
-from hil_sim.monitor.listener import ForeignFrame
 from hil_sim.monitor.traffic import ForeignMeter, ForeignTraffic, MessageMeter, MessageTraffic
 
 COUNTS = ("WrongCrcFrames", "WrongLengthFrames", "RepeatedFrames", "LostFrames", "ReorderedFrames")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from hil_sim.bus.buses import Frame
 from hil_sim.bus.database import MessageCodec, Values
-from hil_sim.monitor.listener import ForeignFrame
+from hil_sim.bus.foreign import ForeignFrame
 
 RATE_WINDOW_S = 3.0
 STALE_CYCLES = 3.0

@@ -10,6 +10,7 @@ from typing import Protocol
 
 from hil_sim.bus.buses import CanBus, Frame
 from hil_sim.bus.catalog import FrameId
+from hil_sim.bus.deadline import Deadline
 from hil_sim.nodes.clock import Clock
 from hil_sim.nodes.punctuality import DEADLINE_PERIODS, Slots
 
@@ -18,7 +19,8 @@ MEASUREMENT_ID = FrameId.CELL_ELECTRICAL
 PHASE_PERIODS = 20
 """Measurements after which an ECU on its own clock corrects its phase."""
 
-_LONGEST_START_FRAMES = 1000
+_LONGEST_START_GAPS = 20
+"""A bus without a gap for as long is busy with something else than a period."""
 _MOST_FRAMES_A_PERIOD = 1000
 
 
@@ -49,7 +51,8 @@ class EcuNode:
 
     def answer(self, timeout_s: float) -> bool:
         """Take in frames until a SYNC has been answered; False when timeout_s pass without."""
-        while (frame := self._bus.receive(timeout_s)) is not None:
+        deadline = Deadline(timeout_s)
+        while (frame := self._bus.receive(deadline.left_s)) is not None:
             if self._take(frame):
                 self._step()
                 return True
@@ -124,6 +127,7 @@ class EcuNode:
 
     def _await_gap(self, gap_s: float) -> None:
         """Let a period that began before the ECU listened pass, so that the first one is whole."""
-        for _ in range(_LONGEST_START_FRAMES):
+        deadline = Deadline(_LONGEST_START_GAPS * gap_s)
+        while deadline.left_s > 0.0:
             if self._bus.receive(gap_s) is None:
                 return

@@ -6,11 +6,13 @@ import struct
 from dataclasses import dataclass
 
 from hil_sim.bus.buses import CanBus, Frame
+from hil_sim.bus.deadline import Deadline
 
 LOSS_ID = 0x7F0
 """Of SLCAN_LINK_LOSS_ID in firmware_c/port/slcan_link.h, which explains the frame."""
 _LATE_S = 0.05
-_MOST_LATE_FRAMES = 100
+"""A line that is quiet for as long has said everything."""
+_LATEST_S = 5.0
 _COUNTS = struct.Struct("<II")
 
 
@@ -45,8 +47,8 @@ class LossWatch:
 
     def hear_out(self, bus: CanBus) -> None:
         """Take in what was said after the last answer."""
-        for _ in range(_MOST_LATE_FRAMES):
-            frame = bus.receive(_LATE_S)
-            if frame is None:
-                return
+        deadline = Deadline(_LATEST_S)
+        while (frame := bus.receive(min(_LATE_S, deadline.left_s))) is not None:
             self.pass_on([frame])
+            if deadline.left_s == 0.0:
+                return

@@ -15,7 +15,7 @@ from hil_sim.bus.e2e import Receiver, Sender
 from hil_sim.bus.fault_bits import FaultBits
 from hil_sim.bus.identity import Identity
 from hil_sim.logs.recorder import Recorder
-from hil_sim.nodes.turns import Turn
+from hil_sim.nodes.turns import MOST_FRAMES, Turn
 from hil_sim.plant.sensors import Readings
 
 CONNECT_ATTEMPTS = 10
@@ -220,8 +220,8 @@ class PlantNode:
 
     def _late_frames(self, period: int) -> list[StampedFrame]:
         """What came too late for the last period; it must not pass for an answer to this one."""
-        late = []
-        while (frame := self._bus.receive(0.0)) is not None:
+        late = list[StampedFrame]()
+        while len(late) < MOST_FRAMES and (frame := self._bus.receive(0.0)) is not None:
             late.append((self._turn.time_s(period), frame))
         return late
 

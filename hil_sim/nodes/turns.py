@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Protocol
 
 from hil_sim.bus.buses import CanBus, Frame
+from hil_sim.bus.deadline import Deadline
 from hil_sim.nodes.clock import Clock
 from hil_sim.nodes.punctuality import PlantWatch
 
@@ -80,8 +81,9 @@ class LockStep:
         """Frames up to the last one of the ECU's step, or until it has been silent too long."""
         if self._serve is not None:
             self._serve()
+        deadline = Deadline(self._timeout_s)
         for _ in range(MOST_FRAMES):
-            frame = bus.receive(self._timeout_s)
+            frame = bus.receive(deadline.left_s)
             if frame is None:
                 return
             yield frame

@@ -128,6 +128,13 @@ class Summary:
         return reasons
 
     @property
+    def shortfall(self) -> str | None:
+        """How full the cell is where time ended before the charge did; None where it did not."""
+        if self.stop_reason != STOP_TIME_LIMIT:
+            return None
+        return f"time ended before the charge: state of charge {100.0 * self.final_soc:.2f} %"
+
+    @property
     def passed(self) -> bool:
         """Whether every limit was kept and the charge did not end in a fault or in silence."""
         return not self.failures

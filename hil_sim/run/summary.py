@@ -18,6 +18,9 @@ from hil_sim.run.result import (
 )
 from hil_sim.run.settings import ControllerKind, Settings
 
+FOREIGN_ECU = "foreign-ecu"
+"""An ECU on the bus that does not say what it is, so that its decisions are none of ours."""
+
 
 def sum_up(
     settings: Settings,
@@ -30,11 +33,13 @@ def sum_up(
     """The result of a charge that ended for a reason of hil_sim.run.result after wall_time_s."""
     series, extremes = charge.series, charge.plant.extremes
     limits = settings.preset.limits
-    estimates = settings.controller is ControllerKind.KAN_RCBF
+    is_firmware = settings.controller is ControllerKind.KAN_RCBF
+    is_foreign = is_firmware and charge.identity is None
+    estimates = is_firmware and not is_foreign
     errors_K = estimate_errors_K(series) if estimates else []
     violations = tuple(extremes.violations(limits))
     summary = Summary(
-        controller=settings.controller.value,
+        controller=FOREIGN_ECU if is_foreign else settings.controller.value,
         preset=settings.preset.name,
         bus=settings.bus,
         steps=charge.steps,

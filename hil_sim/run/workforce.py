@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
 from bms.errors import InputError
@@ -34,8 +35,23 @@ class InlineExecutor(Executor):
         return future
 
 
-def _leave_interrupts_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+class WorkerPool(ProcessPoolExecutor):
+    """Processes on this machine that leave Ctrl-C to their parent from their first moment on.
+
+    Each is a new interpreter: a copy of this one could hold a lock of the progress bar.
+    """
+
+    def __init__(self, jobs: int) -> None:
+        super().__init__(jobs, multiprocessing.get_context("spawn"))
+        resource_tracker.ensure_running()  # it would unblock the signal when it is started below
+
+    def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
+        """The future of a call; a process that is started for it inherits the blocked signal."""
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return super().submit(fn, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager
@@ -44,8 +60,7 @@ def local_workforce(jobs: int) -> Iterator[Workforce]:
     if jobs == 1:
         yield Workforce(InlineExecutor(), 1)
         return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, context, _leave_interrupts_to_the_parent) as executor:
+    with WorkerPool(jobs) as executor:
         yield Workforce(executor, 2 * jobs)
 
 

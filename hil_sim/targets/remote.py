@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from bms.errors import BusError
 from hil_sim.bus.buses import CanBus, Frame
+from hil_sim.bus.deadline import Deadline
 
 _ANSWER_TIMEOUT_S = 10.0
-_MOST_FRAMES = 1000
 
 
 class RemoteEcu:
@@ -27,11 +27,12 @@ class RemoteEcu:
     def transmit(self) -> list[tuple[int, bytes]]:
         """Its answer; BusError when none comes or the bus fails."""
         answer: list[tuple[int, bytes]] = []
-        for _ in range(_MOST_FRAMES):
-            frame = self._bus.receive(_ANSWER_TIMEOUT_S)
+        deadline = Deadline(_ANSWER_TIMEOUT_S)
+        while deadline.left_s > 0.0:
+            frame = self._bus.receive(deadline.left_s)
             if frame is None:
-                raise BusError(f"bus '{self._bus.name}': no answer in {_ANSWER_TIMEOUT_S:g} s")
+                break
             answer.append(frame)
             if frame.frame_id == self._last_id:
-                break
-        return answer
+                return answer
+        raise BusError(f"bus '{self._bus.name}': no answer in {_ANSWER_TIMEOUT_S:g} s")

@@ -15,12 +15,12 @@ import socket
 import struct
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 _FRAME = struct.Struct("=IB3x8s")
 _RECEIVE_BUFFER_BYTES = 1 << 20
 _ANSWER_S = 10.0
-_MOST_FRAMES = 1000
 _SILENCE_S = "60"
 
 
@@ -72,15 +72,16 @@ def _answer(
         content = bytes.fromhex(data)
         bus.send(_FRAME.pack(frame_id, len(content), content))
     answer: list[tuple[int, str]] = []
-    for _ in range(_MOST_FRAMES):
+    end_s = time.monotonic() + _ANSWER_S
+    while time.monotonic() < end_s:
         try:
             frame_id, length, content = _FRAME.unpack(bus.recv(_FRAME.size))
         except BlockingIOError:
-            sys.exit(f"no answer in {_ANSWER_S:g} s")
+            break
         answer.append((frame_id, content[:length].hex()))
         if frame_id == last_id:
-            break
-    return answer
+            return answer
+    sys.exit(f"no answer in {_ANSWER_S:g} s")
 
 
 if __name__ == "__main__":

@@ -150,7 +150,7 @@ def on_terminal(*arguments: str) -> tuple[str, str]:
         assert process.stdout is not None
         out = process.stdout.read()
     os.close(near)
-    assert process.returncode == 0
+    assert process.returncode in (0, 1)  # 1: time ends before the charge
     return out.decode(), shown.decode()
 
 

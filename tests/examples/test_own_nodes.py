@@ -92,6 +92,7 @@ def test_an_ecu_of_ones_own_charges_our_plant_within_its_limits(tmp_path: Path) 
     assert finished(ecu) == (0, "silence; last state Complete\n", "")
     summary = json.loads(printed)
     assert (summary["stop_reason"], summary["limits_kept"]) == ("complete", True)
+    assert (summary["controller"], summary["kan_rmse_K"]) == ("foreign-ecu", None)
     assert 0.99 < summary["final_soc"] <= 1.0
     assert 310.0 < summary["max_surface_temperature_K"] < 320.0, "it was derated"
     assert {*summary["command_reception"].values()} == {0}

@@ -1,6 +1,7 @@
 """`bms sil`, `bms ecu` and `bms plant` as a user calls them."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from bms.model import shipped_model_path
-from bms.presets import preset_path
+from bms.presets import DEFAULT_PRESET, load_preset, preset_path
 from tests.hil_sim.command_line import bms
 
 STABLE_KEYS = [
@@ -29,9 +30,37 @@ STABLE_KEYS = [
 HAS_VCAN = Path("/sys/class/net/vcan0").exists()
 
 
+def nearly_full(folder):
+    """The default preset with a cell whose charge ends in seconds."""
+    preset, text = load_preset(DEFAULT_PRESET), preset_path(DEFAULT_PRESET).read_text()
+    soc = f"[initial]\nsoc = {preset.initial.soc:g}"
+    assert text.count(soc) == 1
+    path = folder / "nearly_full.toml"
+    path.write_text(text.replace(soc, f"[initial]\nsoc = {preset.limits.max_soc - 0.01:g}"))
+    return path
+
+
+def test_a_charge_that_becomes_full_is_done(tmp_path):
+    done = bms("sil", "--preset", nearly_full(tmp_path), "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout)["stop_reason"] == "complete"
+
+
+@pytest.mark.parametrize("options", [("--json",), ()], ids=["json", "table"])
+def test_a_charge_whose_time_ends_first_is_not_done_and_says_how_full_it_is(options):
+    done = bms("sil", "--max-time-s", 5, *options)
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert re.fullmatch(
+        r"bms: kan-rcbf: time ended before the charge: state of charge \d+\.\d\d %; "
+        r"see --max-time-s",
+        line,
+    )
+
+
 def test_json_is_all_that_is_printed_and_has_the_stable_keys_first():
     done = bms("sil", "--json", "--max-time-s", 5, "--seed", 3)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 1
     summary = json.loads(done.stdout)
     assert list(summary)[: len(STABLE_KEYS)] == STABLE_KEYS
     assert (summary["controller"], summary["bus"]) == ("kan-rcbf", "virtual:bms")
@@ -40,7 +69,7 @@ def test_json_is_all_that_is_printed_and_has_the_stable_keys_first():
 
 def test_a_run_writes_its_four_files_and_a_table(tmp_path):
     done = bms("sil", "--max-time-s", 5, "--out", tmp_path / "run")
-    assert done.returncode == 0
+    assert done.returncode == 1
     assert sorted(file.name for file in (tmp_path / "run").iterdir()) == [
         "can.log",
         "charge.png",
@@ -60,7 +89,7 @@ def test_the_controller_decides_the_exit_code():
 
 
 def test_a_baseline_stands_beside_it_and_does_not():
-    done = bms("sil", "--baseline", "s-cbf", "--max-time-s", 250, "--json")
+    done = bms("sil", "--baseline", "s-cbf", "--json")
     assert done.returncode == 0
     summary = json.loads(done.stdout)
     assert summary["limits_kept"] is True
@@ -69,7 +98,7 @@ def test_a_baseline_stands_beside_it_and_does_not():
 
 def test_real_time_takes_its_time():
     done = bms("sil", "--realtime", "--max-time-s", 1, "--json")
-    assert done.returncode == 0
+    assert done.returncode == 1
     # Fifteen periods; the first needs no waiting.
     assert json.loads(done.stdout)["wall_time_s"] >= 1.4
 
@@ -135,7 +164,8 @@ def test_names_with_brackets_are_shown_as_they_are(tmp_path):
         *("sil", "--preset", tmp_path / "mine.toml", "--model", model),
         *("--max-time-s", 1, "--out", out),
     )
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
     assert "mine[/bold]" in done.stdout
     assert str(out / "report.html") in done.stdout
 

@@ -22,7 +22,8 @@ import pytest
 
 from bms.firmware import Ecu
 from hil_sim.bus.buses import Frame, open_bus
-from hil_sim.monitor.listener import ForeignFrame, Listener
+from hil_sim.bus.foreign import ForeignFrame
+from hil_sim.monitor.listener import Listener
 from hil_sim.nodes.ecu import EcuNode
 from hil_sim.run.session import run_plant
 from hil_sim.run.settings import Settings

@@ -12,8 +12,8 @@ from bms.presets import load_preset
 from hil_sim.bus.buses import Frame
 from hil_sim.bus.catalog import NETWORK_VERSION
 from hil_sim.bus.e2e import Sender
+from hil_sim.bus.foreign import ForeignFrame
 from hil_sim.bus.identity import Identity
-from hil_sim.monitor.listener import ForeignFrame
 from hil_sim.monitor.model import Reading, SystemModel
 from hil_sim.monitor.presets import PresetFinder
 from hil_sim.monitor.traffic import Rate

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from hil_sim.bus.buses import Frame
 from hil_sim.bus.e2e import Sender
+from hil_sim.bus.foreign import ForeignFrame
 from hil_sim.monitor import wording
 from hil_sim.monitor.bar import Bar
-from hil_sim.monitor.listener import ForeignFrame
 from hil_sim.monitor.model import SystemModel
 from hil_sim.monitor.presets import preset_finder
 from hil_sim.monitor.status_line import status_line

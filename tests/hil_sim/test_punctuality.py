@@ -222,7 +222,7 @@ def test_a_run_in_real_time_shows_its_timing_everywhere(bms, tmp_path):
     code, printed, _ = bms(
         "sil", "--realtime", "--max-time-s", 0.3, "--bus", "virtual:timing", "--out", tmp_path
     )
-    assert code == 0
+    assert code == 1
     timing = json.loads((tmp_path / "summary.json").read_text())["timing"]
     assert timing["periods"] == 8 == json.loads((tmp_path / "summary.json").read_text())["steps"]
     assert 0.0 <= timing["lateness"]["median_ms"] <= timing["lateness"]["p99_ms"]
@@ -237,7 +237,7 @@ def test_a_run_in_real_time_shows_its_timing_everywhere(bms, tmp_path):
 
 def test_a_run_in_virtual_time_shows_none(bms, tmp_path):
     code, printed, _ = bms("sil", "--max-time-s", 1, "--bus", "virtual:none", "--out", tmp_path)
-    assert code == 0
+    assert code == 1
     assert json.loads((tmp_path / "summary.json").read_text())["timing"] is None
     assert "Deadlines missed" not in printed
     assert "Real time" not in (tmp_path / "report.html").read_text()

@@ -295,12 +295,12 @@ def test_an_equal_replay_is_the_log_again(bms, tmp_path):
 def test_a_run_is_recorded_in_the_format_of_the_suffix(bms, tmp_path):
     log, plain = tmp_path / "logs" / "run.asc.gz", tmp_path / "run" / "can.log"
     run = ("sil", "--max-time-s", 5, "--json")
-    assert bms(*run, "--out", plain.parent, "--log", log)[0] == 0
+    assert bms(*run, "--out", plain.parent, "--log", log)[0] == 1
     assert list(read_log(log)) == list(read_log(plain))
     assert bms("replay", log)[0] == 0
     with_log = plain.read_bytes()
     shutil.rmtree(plain.parent)
-    assert bms(*run, "--out", plain.parent)[0] == 0
+    assert bms(*run, "--out", plain.parent)[0] == 1
     assert plain.read_bytes() == with_log
 
 

@@ -324,7 +324,7 @@ def test_remedy_a_recording_from_the_start(bms, tmp_path):
     foreign = put(tmp_path, "foreign.log", b"(0.000000) can0 123#01 R\n")
     option = re.search(r"give a log of 'bms sil (--log) FILE'", refused(bms, foreign))[1]
     path = tmp_path / "run.log"
-    assert bms("sil", "--max-time-s", 3, "--json", option, path)[0] == 0
+    assert bms("sil", "--max-time-s", 3, "--json", option, path)[0] == 1
     assert bms("replay", path)[0] == 0
 
 

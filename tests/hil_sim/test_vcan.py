@@ -93,9 +93,10 @@ def test_two_processes_give_the_frames_of_the_virtual_bus(guest, max_time_s, pre
     assert summary["first_derate_s"] is not None
 
 
-def test_both_processes_end_well_and_the_ecu_saw_every_frame(guest):
+def test_both_processes_end_well_and_the_ecu_saw_every_frame(guest, max_time_s):
     steps = json.loads((guest / "plant.json").read_text())["steps"]
-    assert status(guest / "plant.status") == status(guest / "ecu.status") == 0
+    assert status(guest / "plant.status") == (0 if max_time_s == WHOLE_S else 1)
+    assert status(guest / "ecu.status") == 0
     assert f"{5 * steps} frames received, {steps} steps" in (guest / "ecu.out").read_text()
 
 

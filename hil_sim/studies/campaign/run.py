@@ -13,6 +13,8 @@ from hil_sim.studies.campaign.store import CampaignFolder
 from hil_sim.studies.campaign.worker import run_chunk
 
 Progress = Callable[[int], None]
+FINISHING_S = 0.4
+"""Less than bms.interruption leaves the workers."""
 
 
 def run_campaign(
@@ -23,8 +25,8 @@ def run_campaign(
 ) -> int:
     """Run everything that the folder lacks; return the number of runs done now.
 
-    An interrupt lets pieces in progress finish and be stored, and then passes on. Raises BmsError
-    when a worker dies.
+    At an interrupt, pieces that finish within FINISHING_S are stored too, and then it passes on.
+    Raises BmsError when a worker dies.
     """
     left = iter(folder.unfinished())
     pending: dict[Future[str], range] = {}
@@ -50,7 +52,7 @@ def run_campaign(
         for future in list(pending):
             if future.cancel():
                 del pending[future]
-        collect(wait(pending).done)
+        collect(wait(pending, FINISHING_S).done)
         raise
     except (BrokenProcessPool, CancelledError):
         raise BmsError(

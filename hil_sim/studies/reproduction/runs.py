@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 
@@ -16,6 +14,7 @@ from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.result import RunResult
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import ControllerKind, Settings
+from hil_sim.run.workforce import WorkerPool
 from hil_sim.studies.reproduction.margins import MARGINS, Margin
 
 PRESETS = ("paper_calibrated", "lin2014")
@@ -76,9 +75,7 @@ def run_cases(
 
     Raises BmsError when the system ends one of the processes.
     """
-    # A new interpreter for each process: a copy of this one could hold a lock of the progress bar.
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, context, initializer=_leave_interrupts_to_parent)
+    pool = WorkerPool(jobs)
     try:
         futures = [pool.submit(run_case, case, seed, max_time_s) for case in cases]
         for future in as_completed(futures):
@@ -91,7 +88,3 @@ def run_cases(
     finally:
         pool.shutdown(cancel_futures=True)
     return {case: future.result() for case, future in zip(cases, futures)}
-
-
-def _leave_interrupts_to_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,120 @@
+"""Ctrl-C ends a command within 2 s: exit code 130, one line, no orphan, nothing half-written."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+# What takes long tells how far it is; here from its first step on, which is its sign of life.
+PROGRAM = (
+    "import bms.waiting; bms.waiting.FIRST_LINE_S = 0.0; from bms.cli import main; main()"
+)  # fmt: skip
+SIGN_OF_LIFE_S = 120.0
+END_S = 2.0
+START_S = 1.0
+"""Of a busy machine, on top."""
+
+COMMANDS = {
+    "verify-tables": ("verify-tables", "--stride", 1, "--processes", 2),
+    "campaign": ("campaign", "--runs", 20_000, "--jobs", 2, "--out", "out"),
+    "campaign in one process": ("campaign", "--runs", 20_000, "--jobs", 1, "--out", "out"),
+    "reproduce": ("reproduce", "--jobs", 2, "--out", "out"),
+    "fault-matrix": ("fault-matrix", "--jobs", 2, "--out", "out"),
+    "train": ("train", "--preset", "lin2014", "--out", "model.json"),
+    "sil": ("sil", "--out", "out"),
+    "verify": ("verify",),
+    "cost": ("cost", "--out", "out"),
+    "bench": ("bench",),
+    "compare-estimators": ("compare-estimators", "--preset", "lin2014"),
+}
+KEPT = {"campaign.json", "chunks"}
+"""What `bms campaign --resume` goes on with."""
+
+
+def processes_of_group(group: int) -> list[str]:
+    """Command lines of what still runs."""
+    listing = subprocess.run(
+        ["ps", "-e", "-o", "pgid=,stat=,args="], capture_output=True, text=True, check=True
+    )
+    rows = [line.split(maxsplit=2) for line in listing.stdout.splitlines()]
+    return [args for pgid, stat, args in rows if int(pgid) == group and stat[0] != "Z"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("is_for_all", [True, False], ids=["process group", "main process"])
+@pytest.mark.parametrize("name", COMMANDS)
+def test_ctrl_c_ends_a_command_at_once(name, is_for_all, tmp_path):
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, *map(str, COMMANDS[name])],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+        bufsize=0,
+    ) as process:
+        try:
+            assert process.stderr is not None
+            life = process.stderr.readline()
+            start_s = time.monotonic()
+            if is_for_all:
+                os.killpg(process.pid, signal.SIGINT)
+            else:
+                process.send_signal(signal.SIGINT)
+            _, said = process.communicate(timeout=SIGN_OF_LIFE_S)
+            took_s = time.monotonic() - start_s
+            while processes_of_group(process.pid) and time.monotonic() < start_s + END_S + START_S:
+                time.sleep(0.1)
+            left = processes_of_group(process.pid)
+        finally:
+            for _ in processes_of_group(process.pid)[:1]:
+                os.killpg(process.pid, signal.SIGKILL)
+    assert process.returncode == 130, life + said
+    assert said.decode().splitlines()[-1] == "bms: interrupted"
+    assert "Traceback" not in said.decode()
+    assert took_s < END_S + START_S
+    assert left == []
+    files = {path.name for path in Path(tmp_path).rglob("*") if path.parent.name != "chunks"}
+    assert files - {"out"} <= (KEPT if name.startswith("campaign") else set())
+
+
+BUSY = """
+import subprocess, sys
+from bms.interruption import prompt_interrupts
+with prompt_interrupts():
+    child = subprocess.Popen(["sleep", "60"])
+    print("ready", flush=True)
+    while True:
+        try:
+            child.wait()
+            {body}
+        except KeyboardInterrupt:
+            print("heard", flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    "body",
+    ["import ctypes; ctypes.CDLL(None).sleep(60)", "continue"],
+    ids=["long call of C", "loop that swallows it"],
+)
+def test_what_does_not_end_by_itself_is_ended_with_its_children(body):
+    program = BUSY.format(body=body)
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        child = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()[0]
+        start_s = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=30.0)
+    assert (process.returncode, said) == (130, ("heard\n", "bms: interrupted\n"))
+    assert time.monotonic() - start_s < END_S + START_S
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(child), 0)
