@@ -159,10 +159,6 @@ def test_replayed_with_its_own_current_it_gives_off_the_heat_of_the_recording(pr
         (lambda rows: rows[1:], r"begins with -10 A.*add ',soc='"),
         (lambda rows: rows[:4], r"fewer than 5 rows"),
         (lambda rows: [row.replace("-10.0", "0.0") for row in rows], r"no current flows"),
-        (
-            lambda rows: [row.replace("-10.0", "10.0") for row in rows],
-            r"mohm at state of charge .* give the start with ',soc='",
-        ),
         (lambda rows: [*rows, rows[-1]], r"time_s must rise"),
     ],
 )
@@ -174,6 +170,13 @@ def test_a_recording_that_does_not_tell_a_resistance_is_refused(preset, tmp_path
     with pytest.raises(InputError, match=said) as refused:
         recorded_resistance(path, preset)
     assert str(path) in str(refused.value)
+
+
+def test_a_start_at_which_the_voltage_contradicts_the_cell_is_refused(preset, tmp_path):
+    path = recording(tmp_path / "charge.csv", preset, [-10.0] * 50, lambda soc: 0.005)
+    assert recorded_resistance(path, preset, 0.2).ohm
+    with pytest.raises(InputError, match=r"-\S+ mohm at state of charge .* give the start with"):
+        recorded_resistance(path, preset, 0.9)
 
 
 def test_a_recording_that_begins_under_load_is_taken_with_its_state_of_charge(preset, tmp_path):
