@@ -90,6 +90,15 @@ def read_measurements(path: Path, *, core_may_be_copied: bool = False) -> Measur
     return recording
 
 
+def read_voltage(path: Path) -> Array | None:
+    """Column voltage_V (N,) of a recording; None for one without. InputError as read_columns."""
+    header = _next_row(csv.reader(read_text(path).lstrip("\ufeff").splitlines()[:1]), path) or []
+    if _VOLTAGE not in (name.strip() for name in header):
+        return None
+    voltage_V: Array = read_columns(path, ("time_s", _VOLTAGE))[1]
+    return voltage_V
+
+
 def read_columns(path: Path, columns: Sequence[str]) -> Array:
     """Columns of a CSV file with a header row, time_s first, as an array (columns, rows).
 
