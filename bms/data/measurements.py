@@ -91,12 +91,11 @@ def read_measurements(path: Path, *, core_may_be_copied: bool = False) -> Measur
 
 
 def read_voltage(path: Path) -> Array | None:
-    """Column voltage_V (N,) of a recording; None for one without. InputError as read_columns."""
-    header = _next_row(csv.reader(read_text(path).lstrip("\ufeff").splitlines()[:1]), path) or []
-    if _VOLTAGE not in (name.strip() for name in header):
-        return None
-    voltage_V: Array = read_columns(path, ("time_s", _VOLTAGE))[1]
-    return voltage_V
+    """Column voltage_V (N,) of a recording that read_measurements took; None where it has gaps."""
+    rows = csv.DictReader(read_text(path).lstrip("\ufeff").splitlines())
+    rows.fieldnames = [name.strip() for name in rows.fieldnames or []]
+    voltage_V = np.array([_number_or_nan(row.get(_VOLTAGE) or "") for row in rows])
+    return voltage_V if np.all(np.isfinite(voltage_V)) else None
 
 
 def read_columns(path: Path, columns: Sequence[str]) -> Array:

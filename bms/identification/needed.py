@@ -65,7 +65,7 @@ def needed_uncertainty(
     untold = {}
     try:
         if voltage_V is None:
-            raise InputError("the recording has no column voltage_V")
+            raise InputError("no column voltage_V with a number in each row")
         heat_W = measured_heat_W(cell, recording, voltage_V)
     except InputError as error:
         untold[MEASURED] = str(error)

@@ -121,7 +121,7 @@ class Electrochemistry:
         begin, end = self._outputs(0), self._outputs(-1)
         if not abs(end.voltage_V) < LARGEST_VOLTAGE_V:
             raise PlantError(
-                f"--plant pybamm: {current_A:g} A at state of charge {end.soc:.3f} empties or "
+                f"PyBaMM: {current_A:g} A at state of charge {end.soc:.3f} empties or "
                 "fills an electrode; the controller charges beyond what the cell can hold"
             )
         return begin, end
@@ -154,7 +154,7 @@ def import_pybamm() -> ModuleType:
         import pybamm  # noqa: PLC0415 (an optional extra)
     except ImportError:
         raise InputError(
-            "--plant pybamm: PyBaMM is not installed; run pip install 'kan-rcbf-bms[pybamm]'"
+            "PyBaMM is not installed; run pip install 'kan-rcbf-bms[pybamm]'"
         ) from None
     module: ModuleType = pybamm
     return module

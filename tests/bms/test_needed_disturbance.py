@@ -245,6 +245,19 @@ def test_command_writes_the_bound_that_it_prints(bms, tmp_path):
     assert f"a preset states n0, n1, n2 of '{ASSUMED}'" in text
 
 
+@pytest.mark.parametrize(
+    ("first", "expected"), [("3.3", [3.3, 3.31]), ("", None), ("nan", None), (None, None)]
+)
+def test_voltage_with_a_gap_is_none(tmp_path, first, expected):
+    lines = ["time_s, voltage_V", f"0,{first}", "1,3.31"]
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(lines if first is not None else ["time_s", "0", "1"]), "utf-8")
+
+    found = read_voltage(path)
+
+    assert (None if found is None else found.tolist()) == expected
+
+
 @pytest.mark.slow
 @with_measured_cycle
 def test_measured_drive_cycle_needs_what_the_design_says():

@@ -12,7 +12,7 @@ from bms.errors import InputError
 from bms.presets.schema import CurrentMap
 from bms.validation import parse, read_toml
 from hil_sim.plant.electrochemistry import Outputs
-from hil_sim.studies.plating.charges import least_anode_potential_V, strongest_currents
+from hil_sim.studies.plating.charges import FULL, least_anode_potential_V, strongest_currents
 from hil_sim.studies.plating.current_map import derive_map, mapped_A, steps
 
 needs_pybamm = pytest.mark.skipif(
@@ -61,7 +61,7 @@ def test_strongest_current_is_where_the_anode_just_keeps_its_margin(temperature_
     for charge, current_A in zip(soc, strength_A):
         expected_A = min(Resistor.plates_at_A(temperature_K, charge), MOST_A)
         assert current_A == pytest.approx(expected_A, abs=0.01)
-    assert soc[-1] == pytest.approx(1.0, abs=2e-3)
+    assert soc[-1] == pytest.approx(FULL, abs=2e-3)
 
 
 def test_a_charge_that_the_margin_ends_is_reported_with_0_A():

@@ -9,11 +9,15 @@ import numpy as np
 from scipy.optimize import brentq
 
 from bms.arrays import Array
+from bms.errors import PlantError
 from hil_sim.plant.electrochemistry import Outputs
 
 SOC_STEP = 0.02
 _CURRENT_TOLERANCE_A = 0.005
-_FULL = 0.999
+FULL = 0.99
+"""End of a charge; beyond, the model of the positive electrode has little to say."""
+_NO_SOLUTION_V = -1.0
+_NEAR = 1e-4
 _GROWTH = 1.2
 """At most, from step to step: what a current far too strong does to a full cell is not solved."""
 _LEAST_A = 0.02
@@ -53,11 +57,16 @@ def strongest_currents(
     cell.restart()
     soc, strength_A = 0.0, most_A
     charges, strengths_A = [], []
-    while soc < _FULL:
-        step_s = min(SOC_STEP, 1.0 - soc) * cell.capacity_As / strength_A
+    while soc < FULL - _NEAR:
+        step_s = min(SOC_STEP, FULL - soc) * cell.capacity_As / strength_A
 
         def room_V(strength_A: float, step_s: float = step_s) -> float:
-            _, end = cell.step(-strength_A, temperature_K, step_s)
+            try:
+                _, end = cell.step(-strength_A, temperature_K, step_s)
+            except PlantError:
+                if strength_A == 0.0:
+                    raise
+                return _NO_SOLUTION_V
             return end.anode_potential_V - margin_V
 
         stronger_A = min(_GROWTH * strength_A, most_A)
@@ -84,13 +93,13 @@ def least_anode_potential_V(
 ) -> tuple[float, float]:
     """Least anode potential (V) of a charge and the state of charge there.
 
-    The current (A) follows the state of charge, from rest at the cell's beginning until it is full
-    or the current ends.
+    The current (A) follows the state of charge, from rest at the cell's beginning until FULL or
+    the current ends.
     """
     cell.restart()
     soc, least_V, at_soc = 0.0, np.inf, 0.0
-    while soc < _FULL:
-        rise = min(SOC_STEP, 1.0 - soc)
+    while soc < FULL - _NEAR:
+        rise = min(SOC_STEP, FULL - soc)
         # What the end is allowed, where the potential is least.
         now_A = strength_A(soc + rise)
         if now_A < _LEAST_A:
