@@ -90,6 +90,14 @@ def read_measurements(path: Path, *, core_may_be_copied: bool = False) -> Measur
     return recording
 
 
+def read_voltage(path: Path) -> Array | None:
+    """Column voltage_V (N,) of a recording that read_measurements took; None where it has gaps."""
+    rows = csv.DictReader(read_text(path).lstrip("\ufeff").splitlines())
+    rows.fieldnames = [name.strip() for name in rows.fieldnames or []]
+    voltage_V = np.array([_number_or_nan(row.get(_VOLTAGE) or "") for row in rows])
+    return voltage_V if np.all(np.isfinite(voltage_V)) else None
+
+
 def read_columns(path: Path, columns: Sequence[str]) -> Array:
     """Columns of a CSV file with a header row, time_s first, as an array (columns, rows).
 

@@ -9,11 +9,14 @@ from bms.cell import CellParameters
 from bms.data.measurements import Measurements
 
 
-def thermal_trajectory(cell: CellParameters, recording: Measurements) -> tuple[Array, Array]:
+def thermal_trajectory(
+    cell: CellParameters, recording: Measurements, heat_W: Array | None = None
+) -> tuple[Array, Array]:
     """Core and surface temperature in K, both (N,), from the first measured ones on.
 
     Exact solution of the cell model between the recording's own times, with the current of a row
-    held until the next row and the coolant at the mean of both. Source: design, cell model.
+    held until the next row and the coolant at the mean of both. A heat (N - 1,) that is given takes
+    the place of the cell's own. Source: design, cell model.
     """
     step_s = np.diff(recording.time_s)
     current_A = recording.current_A[:-1]
@@ -25,11 +28,16 @@ def thermal_trajectory(cell: CellParameters, recording: Measurements) -> tuple[A
     inner_W_per_K = 1.0 / cell.core_resistance_K_per_W
     outer_W_per_K = 1.0 / cell.surface_resistance_K_per_W
     # d/dt [core, surface] = [[a, b], [c, d]] [core, surface] + [f, g]
-    a = -(inner_W_per_K + cell.entropic_coefficient_V_per_K * current_A) / core_J_per_K
+    if heat_W is None:
+        reversible_W_per_K = cell.entropic_coefficient_V_per_K * current_A
+        heat_W = cell.ohmic_resistance_ohm * current_A**2
+    else:
+        reversible_W_per_K = np.zeros_like(current_A)
+    a = -(inner_W_per_K + reversible_W_per_K) / core_J_per_K
     b = inner_W_per_K / core_J_per_K
     c = inner_W_per_K / surface_J_per_K
     d = -(inner_W_per_K + outer_W_per_K) / surface_J_per_K
-    f = cell.ohmic_resistance_ohm * current_A**2 / core_J_per_K
+    f = heat_W / core_J_per_K
     g = outer_W_per_K * coolant_K / surface_J_per_K
 
     middle, half_gap = 0.5 * (a + d), np.sqrt((0.5 * (a - d)) ** 2 + b * c)

@@ -12,8 +12,8 @@ from bms.errors import InputError, PlantError
 
 MODELS = {"spme": "SPMe", "dfn": "DFN"}
 PARAMETER_SET = "Prada2013"
-DIFFUSIVITY_FACTOR = 3.0
-"""On the particles' diffusivity of the set, which is too slow for the measured 2C charge."""
+DIFFUSIVITY_FACTORS = {PARAMETER_SET: 3.0}
+"""On the particles' diffusivity of a set: Prada's is too slow for the measured 2C charge."""
 REFERENCE_TEMPERATURE_K = 298.0
 """At which the set's open-circuit potentials hold."""
 ELECTRODE_POINTS, PARTICLE_POINTS = 10, 20
@@ -47,10 +47,11 @@ class Outputs:
 
 
 class Electrochemistry:
-    """SPMe or DFN of Prada's cell at one uniform temperature, in steps of one control period.
+    """SPMe or DFN of a parameter set's cell at one uniform temperature, in steps of `step_s`.
 
-    The state of charge counts from the set's own limits: 0 where its open-circuit voltage is 2.0 V,
-    1 where it is 3.6 V. Raises InputError when PyBaMM is missing.
+    The state of charge counts from the set's own limits: of Prada's, 0 where the open-circuit
+    voltage is 2.0 V, 1 where it is 3.6 V. Raises InputError when PyBaMM is missing, or has no such
+    set for a lithium-ion cell with one kind of particle in each electrode.
     """
 
     def __init__(
@@ -59,13 +60,15 @@ class Electrochemistry:
         soc: float,
         temperature_K: float,
         step_s: float,
+        parameter_set: str = PARAMETER_SET,
     ) -> None:
         pybamm = import_pybamm()
-        parameters = _parameters(pybamm, DIFFUSIVITY_FACTOR)
+        parameters = _parameters(pybamm, parameter_set)
         empty, full, _, _ = pybamm.lithium_ion.get_min_max_stoichiometries(
             parameters, inputs=_inputs(0.0, REFERENCE_TEMPERATURE_K)
         )
         self._empty, self._span = float(empty), float(full - empty)
+        self.capacity_As: float = 3600.0 * parameters["Nominal cell capacity [A.h]"]
         parameters.set_initial_state(soc, inputs=_inputs(0.0, REFERENCE_TEMPERATURE_K))
         options = {
             "thermal": "isothermal",
@@ -93,29 +96,32 @@ class Electrochemistry:
         self._state: Any = None
         self._next: Any = None
 
-    def step(self, current_A: float, temperature_K: float) -> tuple[Outputs, Outputs]:
+    def step(
+        self, current_A: float, temperature_K: float, step_s: float | None = None
+    ) -> tuple[Outputs, Outputs]:
         """Begin and end of a step from the present state, which `keep` makes the next state.
 
-        Raises PlantError when the equations cannot be solved.
+        The step takes `step_s` where it is given, else the usual time. Raises PlantError when the
+        equations cannot be solved.
         """
         try:
             self._next = self._solver.step(
                 self._state,
                 self._model,
-                self._step_s,
+                self._step_s if step_s is None else step_s,
                 inputs=_inputs(current_A, temperature_K),
                 save=False,
             )
         except self._failure as error:
             raise PlantError(
-                f"--plant pybamm: no solution with {current_A:g} A at {temperature_K:.1f} K "
+                f"PyBaMM: no solution with {current_A:g} A at {temperature_K:.1f} K "
                 f"({str(error).splitlines()[0]}); start at another state of charge, or take a "
                 "preset with a smaller current"
             ) from None
         begin, end = self._outputs(0), self._outputs(-1)
         if not abs(end.voltage_V) < LARGEST_VOLTAGE_V:
             raise PlantError(
-                f"--plant pybamm: {current_A:g} A at state of charge {end.soc:.3f} empties or "
+                f"PyBaMM: {current_A:g} A at state of charge {end.soc:.3f} empties or "
                 "fills an electrode; the controller charges beyond what the cell can hold"
             )
         return begin, end
@@ -123,6 +129,10 @@ class Electrochemistry:
     def keep(self) -> None:
         """Take the end of the last step as the present state."""
         self._state = self._next
+
+    def restart(self) -> None:
+        """Take the rest at the beginning as the present state."""
+        self._state = self._next = None
 
     def _outputs(self, place: int) -> Outputs:
         value = {name: float(self._next[name].data[place]) for name in self._names}
@@ -144,7 +154,7 @@ def import_pybamm() -> ModuleType:
         import pybamm  # noqa: PLC0415 (an optional extra)
     except ImportError:
         raise InputError(
-            "--plant pybamm: PyBaMM is not installed; run pip install 'kan-rcbf-bms[pybamm]'"
+            "PyBaMM is not installed; run pip install 'kan-rcbf-bms[pybamm]'"
         ) from None
     module: ModuleType = pybamm
     return module
@@ -165,17 +175,24 @@ def _meshes(pybamm: ModuleType, equations: Any) -> dict[str, Any]:
     }
 
 
-def _parameters(pybamm: ModuleType, diffusivity_factor: float) -> Any:
-    """Prada's set, with current and temperature as inputs of each step."""
-    parameters = pybamm.ParameterValues(PARAMETER_SET)
+def _parameters(pybamm: ModuleType, parameter_set: str) -> Any:
+    """A set, with current and temperature as inputs of each step."""
+    if parameter_set not in pybamm.parameter_sets:
+        raise InputError(
+            f"PyBaMM has no parameter set '{parameter_set}'; take one such as {PARAMETER_SET}"
+        )
+    parameters = pybamm.ParameterValues(parameter_set)
+    factor = DIFFUSIVITY_FACTORS.get(parameter_set)
     for electrode in ("Negative", "Positive"):
-        parameters[f"{electrode} particle diffusivity [m2.s-1]"] *= diffusivity_factor
-        # The set has no current collectors; the heat's formula asks for them.
+        if factor is not None:
+            parameters[f"{electrode} particle diffusivity [m2.s-1]"] *= factor
+        # Prada's set has no current collectors; the heat's formula asks for them.
+        absent = {
+            f"{electrode} current collector thickness [m]": 0.0,
+            f"{electrode} current collector conductivity [S.m-1]": 1.0,
+        }
         parameters.update(
-            {
-                f"{electrode} current collector thickness [m]": 0.0,
-                f"{electrode} current collector conductivity [S.m-1]": 1.0,
-            },
+            {name: value for name, value in absent.items() if name not in parameters},
             check_already_exists=False,
         )
     parameters.update({_CURRENT: "[input]", _TEMPERATURE: "[input]"})

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bms.cell import CellState, ResistanceTable
+from bms.data.charge import counted_soc
 from bms.data.measurements import read_columns
 from bms.errors import InputError
 from bms.presets import Preset
@@ -60,8 +61,7 @@ def recorded_resistance(
             )
         start_soc = float(cell.ocv.soc_at(voltage_V[0]))
     steps_s = np.diff(time_s, append=time_s[-1])
-    drawn_As = np.cumsum(current_A * steps_s) - current_A * steps_s
-    soc = start_soc - drawn_As / cell.capacity_As
+    soc = counted_soc(cell, start_soc, time_s, current_A)
     work_J = current_A * (cell.ocv(soc) - voltage_V) * steps_s
     square_A2s = current_A**2 * steps_s
     # What is counted beyond full or empty tells of the capacity, not of the resistance.

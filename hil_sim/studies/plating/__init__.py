@@ -1,0 +1,1 @@
+"""Currents at which no lithium plates on the anode of an electrochemical model."""
