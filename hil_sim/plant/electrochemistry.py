@@ -12,8 +12,8 @@ from bms.errors import InputError, PlantError
 
 MODELS = {"spme": "SPMe", "dfn": "DFN"}
 PARAMETER_SET = "Prada2013"
-DIFFUSIVITY_FACTORS = {PARAMETER_SET: 3.0}
-"""On the particles' diffusivity of a set: Prada's is too slow for the measured 2C charge."""
+DIFFUSIVITY_FACTOR = 3.0
+"""On the particles' diffusivity of this set, which is too slow for the measured 2C charge."""
 REFERENCE_TEMPERATURE_K = 298.0
 """At which the set's open-circuit potentials hold."""
 ELECTRODE_POINTS, PARTICLE_POINTS = 10, 20
@@ -63,7 +63,8 @@ class Electrochemistry:
         parameter_set: str = PARAMETER_SET,
     ) -> None:
         pybamm = import_pybamm()
-        parameters = _parameters(pybamm, parameter_set)
+        factor = DIFFUSIVITY_FACTOR if parameter_set == PARAMETER_SET else 1.0
+        parameters = _parameters(pybamm, factor, parameter_set)
         empty, full, _, _ = pybamm.lithium_ion.get_min_max_stoichiometries(
             parameters, inputs=_inputs(0.0, REFERENCE_TEMPERATURE_K)
         )
@@ -175,17 +176,18 @@ def _meshes(pybamm: ModuleType, equations: Any) -> dict[str, Any]:
     }
 
 
-def _parameters(pybamm: ModuleType, parameter_set: str) -> Any:
+def _parameters(
+    pybamm: ModuleType, diffusivity_factor: float, parameter_set: str = PARAMETER_SET
+) -> Any:
     """A set, with current and temperature as inputs of each step."""
     if parameter_set not in pybamm.parameter_sets:
         raise InputError(
             f"PyBaMM has no parameter set '{parameter_set}'; take one such as {PARAMETER_SET}"
         )
     parameters = pybamm.ParameterValues(parameter_set)
-    factor = DIFFUSIVITY_FACTORS.get(parameter_set)
     for electrode in ("Negative", "Positive"):
-        if factor is not None:
-            parameters[f"{electrode} particle diffusivity [m2.s-1]"] *= factor
+        if diffusivity_factor != 1.0:
+            parameters[f"{electrode} particle diffusivity [m2.s-1]"] *= diffusivity_factor
         # Prada's set has no current collectors; the heat's formula asks for them.
         absent = {
             f"{electrode} current collector thickness [m]": 0.0,
