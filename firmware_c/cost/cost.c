@@ -1,13 +1,15 @@
 /* Counts instructions on an emulated target: reads records from a file of the host, runs what each
  * asks for, and writes the timer ticks that it took. hil_sim/studies/cost makes the records.
  *
- * Command line: any name, the file of records, the file for the ticks. The emulator lets its time
- * advance by the same step with every instruction, so that ticks are instructions.
+ * Command line: any name, the file of records, the file for the ticks, and the calibration block of
+ * a preset in place of the compiled-in one. The emulator lets its time advance by the same step with
+ * every instruction, so that ticks are instructions.
  */
 #include <stdbool.h>
 #include <stdint.h>
 
 #include "bms.h"
+#include "bms_symptoms.h"
 #include "can_catalog.h"
 #include "registers.h"
 #include "semihosting.h"
@@ -35,15 +37,20 @@ typedef struct {
 typedef struct {
     uint32_t nothing;
     uint32_t estimate;
+    uint32_t observation; /* of a family; nothing for a single cell */
     uint32_t decision;
     uint32_t period;
 } ticks_t;
 
 typedef struct {
+    const bms_calibration_t *calibration;
+    bms_calibration_t loaded;
     record_t record;
     bms_t bms;
     can_frame_t sent;
     state_t state;
+    family_t family; /* before the period's readings */
+    family_reading_t reading;
     float result;
 } cost_t;
 
@@ -54,14 +61,28 @@ static void do_nothing(cost_t *cost)
 
 static void estimate(cost_t *cost)
 {
-    cost->result = kan_evaluate(&BMS_DEFAULT_CALIBRATION.kan, cost->state.estimator_inputs)
+    cost->result = kan_evaluate(&cost->calibration->kan, cost->state.estimator_inputs)
                        .core_temperature_K;
 }
 
 static void decide(cost_t *cost)
 {
     cost->result =
-        rcbf_solve(&BMS_DEFAULT_CALIBRATION.rcbf, &cost->state.decision_input).current_A;
+        rcbf_solve(&cost->calibration->rcbf, &cost->state.decision_input).current_A;
+}
+
+static void observe_family(cost_t *cost)
+{
+    family_observe(&cost->family, &cost->calibration->family, &cost->calibration->rcbf,
+                   &cost->reading);
+}
+
+static void decide_for_family(cost_t *cost)
+{
+    cost->result = family_decide(&cost->bms.family, &cost->calibration->family,
+                                 &cost->calibration->rcbf, &cost->reading,
+                                 cost->bms.measurement.reference_current_A)
+                       .current_A;
 }
 
 static void run_period(cost_t *cost)
@@ -92,7 +113,7 @@ static void take_state(cost_t *cost)
             .reference_current_A = m->reference_current_A,
         },
     };
-    for (uint32_t i = 0u; i < BMS_DEFAULT_CALIBRATION.kan.lags; i++) {
+    for (uint32_t i = 0u; i < cost->calibration->kan.lags; i++) {
         cost->state.estimator_inputs[KAN_MEASURED_INPUTS + i] = bms->history.filtered[i];
     }
 }
@@ -105,15 +126,33 @@ static uint32_t ticks_of(cost_t *cost, void (*work)(cost_t *))
     return (before - SYSTICK->VAL) & TIMER_MASK;
 }
 
-static ticks_t play(cost_t *cost)
+/* Of the whole period, and of its parts each alone. */
+static ticks_t play_period(cost_t *cost)
 {
     ticks_t ticks = { .nothing = ticks_of(cost, do_nothing) };
-    if (cost->record.kind == PERIOD) {
-        ticks.period = ticks_of(cost, run_period);
-        take_state(cost);
+    const float commanded_A = cost->bms.command_A;
+    cost->family = cost->bms.family;
+    ticks.period = ticks_of(cost, run_period);
+    take_state(cost);
+    cost->reading = reading_of(&cost->bms);
+    cost->reading.command_A = commanded_A;
+    ticks.estimate = ticks_of(cost, estimate);
+    if (cost->calibration->family.is_stated != 0u) {
+        ticks.observation = ticks_of(cost, observe_family);
+        ticks.decision = ticks_of(cost, decide_for_family);
     } else {
-        cost->state = cost->record.content.state;
+        ticks.observation = ticks.nothing;
+        ticks.decision = ticks_of(cost, decide);
     }
+    return ticks;
+}
+
+/* A state is one of a single cell: a family's holds more than a record has. */
+static ticks_t play_state(cost_t *cost)
+{
+    ticks_t ticks = { .nothing = ticks_of(cost, do_nothing) };
+    ticks.observation = ticks.nothing;
+    cost->state = cost->record.content.state;
     ticks.estimate = ticks_of(cost, estimate);
     ticks.decision = ticks_of(cost, decide);
     return ticks;
@@ -121,18 +160,33 @@ static ticks_t play(cost_t *cost)
 
 static bool play_file(cost_t *cost, int32_t records, int32_t results)
 {
-    const bms_config_t config = { &BMS_DEFAULT_CALIBRATION };
+    const bms_config_t config = { cost->calibration };
     while (semihosting_read(records, &cost->record, sizeof cost->record) == sizeof cost->record) {
         if (cost->record.kind == RESTART) {
             bms_init(&cost->bms, &config);
             continue;
         }
-        const ticks_t ticks = play(cost);
+        const ticks_t ticks =
+            (cost->record.kind == PERIOD) ? play_period(cost) : play_state(cost);
         if (semihosting_write(results, &ticks, sizeof ticks) != 0u) {
             return false;
         }
     }
     return true;
+}
+
+/* The compiled-in calibration, or that of a file; false where the file does not hold a usable one. */
+static bool take_calibration(cost_t *cost, const char *path)
+{
+    cost->calibration = &BMS_DEFAULT_CALIBRATION;
+    if (*path == '\0') {
+        return true;
+    }
+    cost->calibration = &cost->loaded;
+    const int32_t file = semihosting_open(path, SEMIHOSTING_READ);
+    return (file >= 0) &&
+           (semihosting_read(file, &cost->loaded, sizeof cost->loaded) == sizeof cost->loaded) &&
+           calibration_is_valid(&cost->loaded);
 }
 
 /* Ends the word where a blank stands, and gives what comes after it. */
@@ -155,12 +209,14 @@ int main(void)
     semihosting_command_line(line, sizeof line);
     char *const records_path = next_word(line);
     char *const results_path = next_word(records_path);
-    (void)next_word(results_path);
+    char *const calibration_path = next_word(results_path);
+    (void)next_word(calibration_path);
     const int32_t records = semihosting_open(records_path, SEMIHOSTING_READ);
     const int32_t results = semihosting_open(results_path, SEMIHOSTING_WRITE);
     SYSTICK->LOAD = TIMER_MASK;
     SYSTICK->CTRL = SYSTICK_ENABLE | SYSTICK_CORE_CLOCK;
-    const bool is_done = (records >= 0) && (results >= 0) && play_file(&cost, records, results);
+    const bool is_done = take_calibration(&cost, calibration_path) && (records >= 0) &&
+                         (results >= 0) && play_file(&cost, records, results);
     semihosting_exit(is_done ? 0u : 1u);
     return 0;
 }

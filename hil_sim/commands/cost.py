@@ -12,7 +12,9 @@ from rich.console import Console
 from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
-from bms.commands.options import JsonOption, seed_option
+from bms.commands.options import JsonOption, PresetOption, seed_option
+from bms.firmware.calibration import calibration_bytes
+from bms.model.model_file import load_shipped_model
 from bms.presets import DEFAULT_PRESET, load_preset
 from bms.waiting import waiting
 from hil_sim.report.folder import OutputFolder
@@ -29,6 +31,7 @@ def cost(
             help=f"Board: {' or '.join(BOARD_NAMES)}. May be repeated. Default: both of them.",
         ),
     ] = None,
+    preset: PresetOption = DEFAULT_PRESET,
     seed: Annotated[int, seed_option("sensor noise and search")] = 0,
     charges: Annotated[
         int, typer.Option("--charges", min=1, help="Random beginnings of charges in the search.")
@@ -50,13 +53,19 @@ def cost(
 ) -> int:
     """Count instructions of estimate, decision and control period over a charge and a search.
 
-    The compiled-in tables run on a board in QEMU, whose time advances by the same step with every
-    instruction. These are instructions, not clock cycles: memory has no wait states, and a division
+    The tables of the preset and its shipped model run on a board in QEMU, whose time advances by
+    the same step with every instruction. A family's observation is counted with both. These are instructions, not clock cycles: memory has no wait states, and a division
     or a square root counts one. `make cost` builds the programs. Exit code 1 beyond --limit.
 
     Example: bms cost --target qemu:mps2-an386 --limit 1500 --out cost.png
     """
-    preset = load_preset(DEFAULT_PRESET)
+    loaded = load_preset(preset)
+    # The program has the default preset's compiled in.
+    calibration = (
+        None
+        if preset == DEFAULT_PRESET
+        else calibration_bytes(loaded, load_shipped_model(loaded.name, preset))
+    )
     boards = [board_name(name) for name in target or BOARD_NAMES]
     with OutputFolder(out.parent) if out is not None else nullcontext() as folder:
         reports = []
@@ -64,10 +73,12 @@ def cost(
             for board in boards:
                 program = built_folder(board) / "cost.elf"
                 reports.append(
-                    measure_cost(program, board, preset, seed, charges, states, wait.begin)
+                    measure_cost(
+                        program, board, loaded, seed, charges, states, wait.begin, calibration
+                    )
                 )
         if folder is not None and out is not None:
-            picture = cost_chart(reports, preset.timing.sampling_period_s)
+            picture = cost_chart(reports, loaded.timing.sampling_period_s)
             folder.path(out.name).write_bytes(picture)
             folder.commit()
     if as_json:

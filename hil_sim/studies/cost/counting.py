@@ -16,9 +16,14 @@ TIMEOUT_S = 1800.0
 
 
 def count(
-    program: Path, board: str, records: Iterable[bytes], timeout_s: float = TIMEOUT_S
+    program: Path,
+    board: str,
+    records: Iterable[bytes],
+    timeout_s: float = TIMEOUT_S,
+    calibration: bytes | None = None,
 ) -> Counts:
-    """Instructions of each record that is not a restart.
+    """Instructions of each record that is not a restart; `calibration` is a block in place of the
+    compiled-in one.
 
     Raises InputError when the program is not built or does not end within timeout_s, QEMU is
     missing or the board is unknown.
@@ -30,6 +35,10 @@ def count(
         inputs, results = Path(name) / "records", Path(name) / "ticks"
         inputs.write_bytes(b"".join(records))
         semihosting = f"enable=on,target=native,arg=cost,arg={inputs},arg={results}"
+        if calibration is not None:
+            block = Path(name) / "calibration"
+            block.write_bytes(calibration)
+            semihosting += f",arg={block}"
         options = ("-icount", f"shift={INSTRUCTION_SHIFT}", "-semihosting-config", semihosting)
         with Emulation(program, board, options=options) as emulation:
             status = emulation.wait(timeout_s)

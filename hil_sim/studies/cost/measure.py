@@ -65,40 +65,37 @@ def measure_cost(
     charges: int,
     states: int,
     note: Callable[[str], None] = lambda part: None,
+    calibration: bytes | None = None,
 ) -> CostReport:
     """Count over a whole charge, `charges` random beginnings of charges, and `states` states in
-    each generation of the search. The program holds the default preset's tables.
+    each generation of the search. `calibration` is the preset's block where the program was built
+    with another's.
 
+    A family's states are searched by beginnings of charges alone, since they hold what came before.
     `note` is told which of the PARTS comes next. Raises InputError.
     """
     rng = np.random.default_rng(seed)
-    note(f"charge on {board}")
+
+    def counted(records: Sequence[bytes], part: str) -> Counts:
+        note(f"{part} on {board}")
+        return count(program, board, records, calibration=calibration)
+
     records, charging = charge_records(Settings(preset, seed=seed))
-    whole = count(program, board, records)
-    note(f"beginnings of charges on {board}")
-    random = count(program, board, list(random_charges(preset, charges, rng)))
-
-    def count_states(records: Sequence[bytes]) -> Counts:
-        note(f"search on {board}")
-        return count(program, board, records)
-
-    searched = search_states(preset, states, rng, count_states)
-    both = whole.estimate + whole.decision
-    series = {
-        "estimate": whole.estimate,
-        "decision": whole.decision,
-        "estimate_and_decision": both,
-        "control_period": whole.period,
+    whole = counted(records, "charge")
+    searched = [counted(list(random_charges(preset, charges, rng)), "beginnings of charges")]
+    if preset.cell.interval is None:
+        searched.append(
+            search_states(preset, states, rng, lambda records: counted(records, "search"))
+        )
+    kinds: dict[str, Callable[[Counts], Instructions]] = {
+        "estimate": lambda counts: counts.estimate,
+        "observation": lambda counts: counts.observation,
+        "decision": lambda counts: counts.decision,
+        "estimate_and_decision": lambda counts: counts.together,
+        "control_period": lambda counts: counts.period,
     }
-    found = {
-        "estimate": (random.estimate, searched.estimate),
-        "decision": (random.decision, searched.decision),
-        "estimate_and_decision": (
-            random.estimate + random.decision,
-            searched.estimate + searched.decision,
-        ),
-        "control_period": (random.period,),
-    }
+    series = {kind: of(whole) for kind, of in kinds.items()}
+    found = {kind: tuple(map(of, searched)) for kind, of in kinds.items()}
     costs = {kind: _cost(series[kind][charging], found[kind]) for kind in series}
     return CostReport(board, costs, series, charging)
 

@@ -17,7 +17,7 @@ _RESTART, _PERIOD, _STATE = range(3)
 _FRAME = struct.Struct("<IB8s3x")
 _STATE_CONTENT = struct.Struct("<8f9f")
 _CONTENT_BYTES = max(MOST_FRAMES * _FRAME.size, _STATE_CONTENT.size)
-_COUNTERS = 4
+_COUNTERS = 5
 
 # 25 MHz timer, and 2^6 ns of the emulator's time for each instruction.
 TICK_NS, INSTRUCTION_SHIFT = 40, 6
@@ -36,11 +36,19 @@ class State(NamedTuple):
 
 
 class Counts(NamedTuple):
-    """Instructions, (N,) each; of a single state the period is 0."""
+    """Instructions, (N,) each; of a single state the period is 0, without a family the
+    observation.
+    """
 
     estimate: IntArray
+    observation: IntArray
     decision: IntArray
     period: IntArray
+
+    @property
+    def together(self) -> IntArray:
+        """Of what leads from the readings to a current."""
+        return self.estimate + self.observation + self.decision
 
 
 def restart() -> bytes:

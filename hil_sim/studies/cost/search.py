@@ -36,7 +36,7 @@ def search_states(
     for _ in range(GENERATIONS):
         counts = count([state(_state(row)) for row in population])
         seen.append(counts)
-        worst = np.argsort(counts.estimate + counts.decision)[-_KEPT:]
+        worst = np.argsort(counts.together)[-_KEPT:]
         parents = population[rng.choice(worst, states)]
         steps = rng.normal(0.0, _STEP, parents.shape) * (high - low)
         population = np.clip(parents + steps, low, high)
