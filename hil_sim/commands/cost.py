@@ -54,8 +54,9 @@ def cost(
     """Count instructions of estimate, decision and control period over a charge and a search.
 
     The tables of the preset and its shipped model run on a board in QEMU, whose time advances by
-    the same step with every instruction. A family's observation is counted with both. These are instructions, not clock cycles: memory has no wait states, and a division
-    or a square root counts one. `make cost` builds the programs. Exit code 1 beyond --limit.
+    the same step with every instruction. A family's observation is counted with estimate and
+    decision. These are instructions, not clock cycles: memory has no wait states, and a division or
+    a square root counts one. `make cost` builds the programs. Exit code 1 beyond --limit.
 
     Example: bms cost --target qemu:mps2-an386 --limit 1500 --out cost.png
     """
