@@ -4,8 +4,6 @@ AUTOSAR E2E profile 2: a CRC in byte 0, and a counter in the low half of byte 1,
 of the message's 16 data ids that the CRC covers too; docs/can.md lists them.
 """
 
-from __future__ import annotations
-
 import time
 from itertools import cycle
 from pathlib import Path
@@ -33,13 +31,12 @@ class ProtectedBus:
     def __init__(self, bus: can.BusABC, node: str) -> None:
         self._bus = bus
         messages = cantools.database.load_file(DATABASE).messages
-        self._messages = {message.name: message for message in messages}
+        self._messages = {each.name: each for each in messages}
         self._heard = {each.frame_id: each for each in messages if node not in each.senders}
         self._data_ids = {
-            message.name: bytes.fromhex(message.dbc.attributes[DATA_IDS].value)
-            for message in messages
-            if DATA_IDS in message.dbc.attributes
-        }
+            each.name: bytes.fromhex(each.dbc.attributes[DATA_IDS].value)
+            for each in messages if DATA_IDS in each.dbc.attributes
+        }  # fmt: skip
         self._counters = {name: cycle(range(COUNTERS)) for name in self._data_ids}
         self._last_counter: dict[str, int] = {}
 
@@ -50,8 +47,8 @@ class ProtectedBus:
             counter = next(self._counters[name])
             data += message.encode({**values, f"{name}Crc": 0, f"{name}Counter": counter})
             data[0] = compute_profile2_crc(data, self._data_ids[name][counter])
-        frame = can.Message(arbitration_id=message.frame_id, data=data, is_extended_id=False)
-        self._bus.send(frame)
+        number = message.frame_id
+        self._bus.send(can.Message(arbitration_id=number, is_extended_id=False, data=data))
 
     def receive(self, timeout_s: float) -> tuple[str, dict] | None:
         """Name and signals of the next message that is intact and new, or None after timeout_s.
@@ -76,7 +73,7 @@ class ProtectedBus:
         if ids is None or len(data) != message.length:
             return len(data) == message.length
         counter, last = data[1] % COUNTERS, self._last_counter.get(message.name)
-        if data[0] != compute_profile2_crc(data, ids[counter]):
-            return False
-        self._last_counter[message.name] = counter
-        return counter != last
+        is_intact = data[0] == compute_profile2_crc(data, ids[counter])
+        if is_intact:
+            self._last_counter[message.name] = counter
+        return is_intact and counter != last

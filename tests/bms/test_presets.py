@@ -94,8 +94,8 @@ def refused(load, path, value):
     return message
 
 
-def test_the_shipped_presets_are_these_two_and_carry_their_names():
-    assert preset_names() == ["lin2014", "paper_calibrated"]
+def test_the_shipped_presets_are_these_and_carry_their_names():
+    assert preset_names() == ["a123_26650", "a123_26650_10C", "lin2014", "paper_calibrated"]
     for name in preset_names():
         preset = load_preset(name)
         assert preset.name == name

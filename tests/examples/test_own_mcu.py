@@ -41,7 +41,10 @@ def load_control(out: Path, change: tuple[str, str] | None = None) -> tuple[FFI,
     """The example's control.c with the core; `change` replaces a text in it by another one."""
     out.mkdir(exist_ok=True)
     shutil.copy(EXAMPLE / "control.h", out)
-    modules = ("calibration", "history", "kan", "monitor", "rcbf", "soc", "thermal")
+    modules = (
+        *("calibration", "family_tables", "history", "kan", "monitor"),
+        *("rcbf", "soc", "thermal"),
+    )
     sources = [EXAMPLE / "control.c", CORE / "generated" / "calibration_default.c"]
     sources += [CORE / "src" / f"{module}.c" for module in modules]
     headers = [header.removeprefix("firmware_c/") for header in CORE_HEADERS]

@@ -28,7 +28,9 @@ from tests.firmware.ports import image, needs_compiler
 pytestmark = needs_compiler
 
 SOURCES = [FIRMWARE / "image" / "image.c"]
-HEADERS = [f"include/{name}.h" for name in ("kan", "rcbf", "thermal", "calibration")]
+HEADERS = [
+    f"include/{name}.h" for name in ("kan", "soc", "rcbf", "family", "thermal", "calibration")
+]
 HEADERS.append("image/image.h")
 SAMPLE = 1500
 

@@ -14,13 +14,13 @@ from tests.hil_sim.test_faults_matrix import ROWS, is_quick
 
 ROOT = Path(__file__).parents[2]
 MATRIX = "tests/hil_sim/test_faults_matrix.py"
-NEVER = "{ 255u, false }"
+NEVER = "{ 255u, false, 0u }"
 
 # Name of the fault, its row of the policy, and the message whose loss it stands for.
 IGNORED = [
-    ("thermal-missing", "[FAULT_THERMAL_MISSING] = { 3u, true }", "CellThermal"),
-    ("current-deviation", "[FAULT_CURRENT_DEVIATION] = { 3u, false }", None),
-    ("corrupted-frames", "[FAULT_CORRUPTED_FRAMES] = { 3u, false }", None),
+    ("thermal-missing", "[FAULT_THERMAL_MISSING] = { 3u, true, 0u }", "CellThermal"),
+    ("current-deviation", "[FAULT_CURRENT_DEVIATION] = { 3u, false, 0u }", None),
+    ("corrupted-frames", "[FAULT_CORRUPTED_FRAMES] = { 3u, false, 0u }", None),
 ]
 
 
