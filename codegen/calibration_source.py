@@ -9,6 +9,7 @@ from bms.tables import network_tables
 from codegen.rendering import environment, initialiser
 
 FILE_NAME = "calibration_default.c"
+ROUNDING_K = 1e-12
 
 
 def calibration_source(preset: Preset, model: KanModel) -> dict[str, str]:
@@ -22,10 +23,14 @@ def calibration_source(preset: Preset, model: KanModel) -> dict[str, str]:
             model=model,
             table_error_K=f"{tables.error_bound_K:.1e}",
             edge_errors_K=[
-                f"{edge.worst_error * model.network.output_half_range_K:.1e}"
-                for edge in tables.edges
+                _said(edge.worst_error * model.network.output_half_range_K) for edge in tables.edges
             ],
             initialiser=initialiser(calibration_fields(preset, model)),
         )
     )
     return {FILE_NAME: text}
+
+
+def _said(error_K: float) -> str:
+    """What float64 leaves of an error that is none differs from processor to processor."""
+    return f"{error_K:.1e}" if error_K > ROUNDING_K else f"below {ROUNDING_K:.0e}"

@@ -14,6 +14,7 @@ from bms.arrays import Array, Mask
 from bms.barrier import sampling_margins
 from bms.data.simulate import Samples
 from bms.decision import ACTIVE_CONSTRAINTS, ConstraintMargins, Decision
+from bms.errors import InputError
 from bms.firmware._firmware import ffi, lib
 from bms.firmware.calibration import calibration_block
 from bms.kan.network import INPUT_NAMES
@@ -135,8 +136,14 @@ class Firmware:
         """Charging current that is nearest to the reference within all constraints.
 
         The core temperature is the estimate; its error bound is in the constraints. Infeasible
-        states and inputs that are not finite give 0 A with `feasible` false.
+        states and inputs that are not finite give 0 A with `feasible` false. Raises InputError for
+        a preset with a family of cells, whose decisions rest on what was measured before.
         """
+        if self.preset.cell.interval is not None:
+            raise InputError(
+                f"preset '{self.preset.name}': one state does not decide for a family of cells; "
+                "use bms.firmware.Ecu, which observes it period by period"
+            )
         write_decision_input(
             self._input,
             soc=soc,

@@ -13,12 +13,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import Chebyshev, Polynomial
+from numpy.polynomial import Polynomial
 
 from bms.arrays import Array
 from bms.data.lags import QUANTITIES, Lags, settling_time_s
 from bms.errors import InputError
 from bms.kan.network import Edge, Network
+from bms.tables.edge_polynomials import edge_polynomial
 
 MAX_LAYERS, MAX_WIDTH, MAX_KNOTS, MAX_COEFFICIENTS = 3, 8, 128, 512
 MAX_LAGS, MAX_DIRECTIONS = 4, 8
@@ -145,18 +146,13 @@ def _edge_table(edge: Edge, degree: int, grid: int, halvings: int) -> EdgeTable:
     knots = np.append(np.concatenate(pieces), own[-1]).astype(np.float32).astype(np.float64)
     coefficients, worst, steepest = [], 0.0, 0.0
     for low, high in pairwise(knots):
-        chebyshev = Chebyshev.interpolate(
-            lambda x: edge.evaluate(x, degree)[0], CELL_COEFFICIENTS - 1, [low, high]
-        )
-        middle = 0.5 * (low + high)
-        shifted = chebyshev.convert(kind=Polynomial)(Polynomial([middle, 1.0]))
-        padded = np.zeros(CELL_COEFFICIENTS)
-        padded[: len(shifted.coef)] = shifted.coef
-        coefficients.append(padded)
+        polynomial = Polynomial(edge_polynomial(edge, degree, low, high, CELL_COEFFICIENTS))
+        coefficients.append(polynomial.coef)
         probe = np.linspace(low, high, 257)
-        error = Polynomial(padded)(probe - middle) - edge.evaluate(probe, degree)[0]
+        distance = probe - 0.5 * (low + high)
+        error = polynomial(distance) - edge.evaluate(probe, degree)[0]
         worst = max(worst, float(np.max(np.abs(error))))
-        steepest = max(steepest, float(np.max(np.abs(shifted.deriv()(probe - middle)))))
+        steepest = max(steepest, float(np.max(np.abs(polynomial.deriv()(distance)))))
     return EdgeTable(knots, np.asarray(coefficients), worst, steepest)
 
 

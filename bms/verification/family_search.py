@@ -26,7 +26,7 @@ from bms.cell import (
     scaled,
     terminal_voltage_V,
 )
-from bms.firmware._firmware import ffi, lib
+from bms.firmware.family_core import FamilyCore, family_reading
 from bms.presets import Preset
 
 SAMPLES = 2000
@@ -85,20 +85,15 @@ class _Trial:
 
     def reading(self, command_A: float) -> Any:
         """What the firmware is told."""
-        return ffi.new(
-            "family_reading_t *",
-            {
-                "current_A": self.current_A + self.errors["current_A"],
-                "voltage_V": self.voltage_V + self.errors["voltage_V"],
-                "surface_temperature_K": self.state.surface_temperature_K
-                + self.errors["surface_K"],
-                "coolant_temperature_K": self.state.coolant_temperature_K
-                + self.errors["coolant_K"],
-                "estimated_core_K": float("nan"),
-                "command_A": command_A,
-                "is_usable": True,
-                "is_charging": True,
-            },
+        return family_reading(
+            current_A=self.current_A + self.errors["current_A"],
+            voltage_V=self.voltage_V + self.errors["voltage_V"],
+            surface_temperature_K=self.state.surface_temperature_K + self.errors["surface_K"],
+            coolant_temperature_K=self.state.coolant_temperature_K + self.errors["coolant_K"],
+            estimated_core_K=float("nan"),
+            command_A=command_A,
+            is_usable=True,
+            is_charging=True,
         )
 
 
@@ -171,7 +166,7 @@ def _draw(preset: Preset, random: np.random.Generator) -> _Trial:
 def _try_out(
     preset: Preset, block: Any, trial: _Trial, random: np.random.Generator
 ) -> Iterator[Violation]:
-    limits, timing, k = preset.limits, preset.timing, block.family
+    limits, timing = preset.limits, preset.timing
     begin = {
         "soc": trial.state.soc,
         "core_K": trial.state.core_temperature_K,
@@ -181,14 +176,15 @@ def _try_out(
         "voltage_V": trial.voltage_V,
     }
     command_A = trial.current_A / trial.supply
-    family = _claimed(preset, block, trial, command_A, random)
+    core = _claimed(preset, block, trial, command_A, random)
+    family = core.state
     period_s = timing.sampling_period_s
     # A period at the present current, as the observer's last one.
     trial.run(period_s)
     if trial.voltage_V > limits.max_voltage_V:
         return
     reading = trial.reading(command_A)
-    lib.family_observe(family, ffi.addressof(k), ffi.addressof(block.rcbf), reading)
+    core.observe(reading)
     room_K = limits.max_core_temperature_K - trial.state.core_temperature_K
     yield from _broken(
         "core above the observer's bound", family.core_room_K - room_K - _ROUNDING_K, begin
@@ -199,10 +195,8 @@ def _try_out(
     yield from _broken(
         "charge above its interval", trial.state.soc - family.soc_high.soc - 1e-6, begin
     )
-    decision = lib.family_decide(
-        family, ffi.addressof(k), ffi.addressof(block.rcbf), reading, limits.reference_current_A
-    )
-    if lib.family_is_full(family, ffi.addressof(k), limits.completion_soc):
+    decided_A = core.decide(reading, limits.reference_current_A)
+    if core.is_full(limits.completion_soc):
         yield from _broken(
             "complete too early", limits.completion_soc - trial.state.soc - 1e-4, begin
         )
@@ -210,28 +204,28 @@ def _try_out(
     # An earlier decision answers for what has happened up to here.
     was_within = trial.voltage_V <= limits.max_voltage_V
     was_cool = trial.state.core_temperature_K <= limits.max_core_temperature_K
-    trial.current_A = decision.current_A * trial.supply
+    trial.current_A = decided_A * trial.supply
     highest_V = trial.run(period_s)
-    if was_within or decision.current_A < 0.0:
+    if was_within or decided_A < 0.0:
         yield from _broken(
             "voltage above its limit", highest_V - limits.max_voltage_V - _ROUNDING_V, begin
         )
-    if was_cool and decision.current_A < 0.0:
+    if was_cool and decided_A < 0.0:
         over_K = trial.state.core_temperature_K - limits.max_core_temperature_K
         yield from _broken("core above its limit", over_K - _ROUNDING_K, begin)
 
 
 def _claimed(
     preset: Preset, block: Any, trial: _Trial, command_A: float, random: np.random.Generator
-) -> Any:
+) -> FamilyCore:
     """An observer that knows no more than is true: at times all of it, at times much less."""
     limits = preset.limits
     branches = trial.cell.branches
     strengths_A = [
         volts / branch.resistance_ohm for volts, branch in zip(trial.branches_V, branches)
     ] or [-trial.current_A]
-    family = ffi.new("family_t *")
-    lib.family_reset(family)
+    core = FamilyCore(block)
+    family = core.state
     loose = random.uniform(0.0, 0.1) * random.integers(0, 2)
     soc = trial.state.soc
     family.soc_low.soc, family.soc_high.soc = max(soc - loose, 0.0), soc + loose
@@ -242,19 +236,14 @@ def _claimed(
     family.supply_low_A = family.supply_high_A = -command_A
     for i in range(2):
         family.commands_A[i] = -command_A
-    lib.family_observe(
-        family,
-        ffi.addressof(block.family),
-        ffi.addressof(block.rcbf),
-        trial.reading(command_A),
-    )
+    core.observe(trial.reading(command_A))
     family.soc_low.soc, family.soc_high.soc = max(soc - loose, 0.0), soc + loose
     family.soc_low.lost = family.soc_high.lost = 0.0
     above_K = random.uniform(0.0, 3.0) * random.integers(0, 2)
     hottest_K = min(trial.state.core_temperature_K + above_K, limits.max_core_temperature_K)
     family.core_room_K = limits.max_core_temperature_K - hottest_K
     family.core_is_known = True
-    return family
+    return core
 
 
 def _broken(claim: str, by: float, state: dict[str, float]) -> Iterator[Violation]:

@@ -31,7 +31,7 @@ def plating(
         str, typer.Option("--set", help="PyBaMM's parameter set of the cell.")
     ] = PARAMETER_SET,
     model: Annotated[
-        str, typer.Option("--model", help=f"PyBaMM's model: {' or '.join(MODELS)}.")
+        str, typer.Option("--physics", help=f"PyBaMM's model: {' or '.join(MODELS)}.")
     ] = "spme",
     temperatures: Annotated[
         str, typer.Option("--temperatures", help="Rows of the map: temperatures in K, up to 8.")
@@ -68,7 +68,7 @@ def plating(
     Example: bms plating --set Prada2013 --most 10 --out map.toml
     """
     if model not in MODELS:
-        raise InputError(f"--model {model}: not known; take one of {', '.join(MODELS)}")
+        raise InputError(f"--physics {model}: not known; take one of {', '.join(MODELS)}")
     if out is not None and out.suffix != ".toml":
         raise InputError(f"--out {out}: a map is a file with the ending .toml; change the name")
     axes = {

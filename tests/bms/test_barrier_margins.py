@@ -291,7 +291,7 @@ def test_with_no_time_and_perfect_sensors_only_arithmetic_needs_a_margin(preset)
         timing=replace(preset.timing, sampling_period_s=1e-12, delay_s=0.0),
         sensors=replace(preset.sensors, **perfect),
     )
-    margins = sampling_margins(preset.cell, ideal, BusQuantisation(*[0.0] * 6))
+    margins = sampling_margins(preset.cell, ideal, BusQuantisation(*[0.0] * 7))
     rounding = rounding_allowances(preset.cell, preset)
     assert margins.core_K_per_s == pytest.approx(rounding.core_K_per_s, abs=1e-10)
     assert margins.surface_K_per_s2 == pytest.approx(rounding.surface_K_per_s2, abs=1e-10)

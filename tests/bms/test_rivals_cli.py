@@ -90,7 +90,7 @@ def test_recording_is_judged_by_its_last_third(bms, recording):
 
     result = json.loads(out)
     assert code == 0
-    assert "train one with 'bms train --data'" in err
+    assert f"train one with 'bms train --data {recording} --lagged" in err
     for row in result["estimators"]:
         assert row["errors"]["fitted two thirds"]["samples"] == 400
         assert row["errors"]["last third"]["samples"] == 200

@@ -70,9 +70,10 @@ def test_each_key_has_its_unit_by_its_name():
     units = {"_V": "V", "_A": "A", "_K": "K", "_W": "W", "_s": "s", "_ohm": "ohm", "_Ah": "A h"} | {
         "_K_per_W": "K/W", "_J_per_K": "J/K", "_V_per_K": "V/K", "_A_per_s": "A/s",
         "_per_s": "1/s", "_per_s2": "1/s²", "_K_per_s": "K/s", "_K_per_s2": "K/s²",
+        "_K_per_As": "K/s/A", "_K_per_A2s": "K/s/A²",
     }  # fmt: skip
     for key, unit in re.findall(r"^\| `(\w+)` \| ([^|]+) \|", TEXT, re.MULTILINE):
-        endings = [ending for ending in units if key.endswith(ending)]
+        endings = [ending for ending in units if f"_{key}".endswith(ending)]
         if endings:
             assert unit == units[max(endings, key=len)], key
         else:
@@ -89,23 +90,49 @@ def test_the_example_is_complete_and_loads(tmp_path):
     assert sampling_margins(preset.cell, preset).surface_K_per_s2 > 0.0
 
 
-def test_all_that_the_example_leaves_out_is_what_the_page_says():
-    content = tomllib.loads(EXAMPLE)
-    missing = set()
+def optional_keys(kind, table=""):
+    """Keys that the schema lets a file leave out, and tables as a whole, by their paths."""
+    hints = get_type_hints(kind)
+    optional = set()
+    for field in dataclasses.fields(kind):
+        path = f"{table}.{field.name}".strip(".")
+        has_default = field.default is not dataclasses.MISSING
+        if has_default or field.default_factory is not dataclasses.MISSING:
+            optional.add(path)
+        inner = inner_table(hints[field.name])
+        if inner is not None and kind is not Sensors:
+            optional |= optional_keys(inner, path)
+    return optional
+
+
+def optional_on_the_page():
+    """Paths of what the page says may be left out: in a key's line, or above a table's lines."""
+    optional = set()
+    for section in TEXT.split("\n## ")[1:]:
+        heading = re.match(r"`\[([\w.]+)\]`", section)
+        table = heading[1] if heading else ""
+        above = section.split("\n| key")[0]
+        if "may be left out" in above:
+            optional.add(table)
+        for key, line in re.findall(r"^\| `(\w+)` \|(.*)$", section, re.MULTILINE):
+            if re.search("may be left out|leave it out", line) or "so may each key" in above:
+                optional.add(f"{table}.{key}".strip("."))
+    return optional
+
+
+def test_what_may_be_left_out_is_what_the_page_says():
+    assert optional_on_the_page() == optional_keys(Preset)
+
+
+def test_all_that_the_example_leaves_out_is_optional():
+    content, optional = tomllib.loads(EXAMPLE), optional_keys(Preset)
     for table, keys in keys_of(Preset).items():
         section = content
         for part in filter(None, table.split(".")):
-            section = section[part]
-        missing |= keys - set(section)
-    assert missing == {"alpha2_per_s"}
-    optional = {
-        f.name
-        for kind in get_type_hints(Preset).values()
-        if dataclasses.is_dataclass(kind)
-        for f in dataclasses.fields(kind)
-        if type(None) in get_args(get_type_hints(kind)[f.name])
-    }
-    assert optional == missing
+            section = section.get(part, {})
+        if section or table not in optional:
+            missing = {f"{table}.{key}".strip(".") for key in keys - set(section)}
+            assert missing <= optional
 
 
 def test_the_example_is_the_published_cell():

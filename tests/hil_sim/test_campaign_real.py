@@ -113,7 +113,11 @@ def test_the_state_at_plug_in_is_off_by_no_more_than_the_preset_says(draws):
 
 
 def test_biases_fill_what_the_sensors_bounds_leave():
-    sensors = replace(PRESET.sensors, voltage_V=replace(PRESET.sensors.voltage_V, bias=-0.003))
+    sensors = replace(
+        PRESET.sensors,
+        voltage_V=replace(PRESET.sensors.voltage_V, bias=-0.003),
+        current_A=replace(PRESET.sensors.current_A, bias=0.0),
+    )
     preset = replace(PRESET, sensors=sensors)
     biases = [draw_of(run, preset).cell.biases for run in range(200)]
     volts = [bias.voltage_V for bias in biases]

@@ -168,7 +168,7 @@ def test_an_ecu_with_another_model_is_refused_before_current_flows(settings, tmp
     with (
         Line(Serial(settings).answer) as line,
         Recorder(tmp_path / "can.log") as recorder,
-        pytest.raises(ModelMismatchError, match="build its image with that model"),
+        pytest.raises(ModelMismatchError, match="give a board that model"),
     ):
         run_sil(replace(settings, bus=line.bus, model=lagged), recorder)
     assert (tmp_path / "can.log").read_text().count(" 080#") == 1

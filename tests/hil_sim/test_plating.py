@@ -121,7 +121,7 @@ def test_axes_have_to_rise(axis):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--model", "p2d"], "--model p2d"),
+        (["--physics", "p2d"], "--physics p2d"),
         (["--out", "map.csv"], "map.csv"),
         (["--soc", "0,x"], "--soc"),
         (["--temperatures", ",".join(str(280 + i) for i in range(9))], "at most 8"),

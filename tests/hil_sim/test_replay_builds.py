@@ -21,7 +21,7 @@ def deaf_to_cold_sensor(tmp_path_factory):
     """A build that ignores one fault: a surface that reads colder than the heat allows."""
     folder = tmp_path_factory.mktemp("mutant")
     shutil.copytree(ROOT / "firmware_c", folder / "tree" / "firmware_c")
-    source = folder / "tree" / "firmware_c" / "src" / "bms.c"
+    source = folder / "tree" / "firmware_c" / "src" / "bms_symptoms.c"
     text = source.read_text()
     assert text.count("limits->surface_deficit_K)") == 1
     source.write_text(text.replace("limits->surface_deficit_K)", "9999.0f)"))
