@@ -80,8 +80,8 @@ def test_a_changed_c_source_stops_every_test_run_until_it_is_built(tmp_path):
     assert run_tests(tree).returncode == 0
     source = tree / "firmware_c" / "src" / "soc.c"
     text = source.read_text(encoding="utf-8")
-    assert "-current_A * period_s" in text
-    source.write_text(text.replace("-current_A * period_s", "current_A * period_s"))
+    assert "-measured_A * period_s" in text
+    source.write_text(text.replace("-measured_A * period_s", "measured_A * period_s"))
     said = run_tests(tree)
     assert said.returncode == pytest.ExitCode.USAGE_ERROR
     assert said.stdout == ""

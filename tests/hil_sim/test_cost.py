@@ -14,8 +14,12 @@ import numpy as np
 import pytest
 
 from bms.errors import InputError
+from bms.firmware.calibration import calibration_bytes
+from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset
 from hil_sim.bus.buses import Frame
+from hil_sim.run.settings import Settings
+from hil_sim.studies.cost.charges import charge_records
 from hil_sim.studies.cost.counting import count
 from hil_sim.studies.cost.measure import CostReport, measure_cost
 from hil_sim.studies.cost.records import State, counts, period, restart, state
@@ -105,6 +109,20 @@ def test_figures_of_a_charge_are_those_of_its_first_decision_to_its_last(report)
     assert np.all(whole[decided] > both[decided])
 
 
+def test_a_family_is_counted_with_its_observation_and_a_broken_block_is_refused(program, report):
+    preset = load_preset("a123_26650_10C")
+    block = calibration_bytes(preset, load_shipped_model(preset.name))
+    records = charge_records(Settings(preset, max_time_s=20.0)).records
+    counted = count(program, FPU, records, calibration=block)
+    deciding = counted.decision > np.median(counted.decision) / 2
+    assert counted.observation[deciding].min() > 100
+    assert np.all(counted.period[deciding] > counted.together[deciding])
+    # Of the compiled-in single cell there is none.
+    assert report.series["observation"].max() == 0
+    with pytest.raises(InputError, match="ended with status 1"):
+        count(program, FPU, records, calibration=block[:-4])
+
+
 def test_the_command_prints_every_figure_and_fails_beyond_its_limit(
     bms, program, tmp_path, monkeypatch
 ):
@@ -149,5 +167,5 @@ def test_records_hold_exactly_the_frames_of_a_period():
 
 
 def test_ticks_of_the_timer_become_instructions():
-    ticks = b"".join(n.to_bytes(4, "little") for n in (10, 26, 1610, 10))
-    assert [values.tolist() for values in counts(ticks)] == [[10], [1000], [0]]
+    ticks = b"".join(n.to_bytes(4, "little") for n in (10, 26, 10, 1610, 10))
+    assert [values.tolist() for values in counts(ticks)] == [[10], [0], [1000], [0]]
