@@ -135,6 +135,23 @@ def test_the_exported_core_builds_and_computes_what_the_firmware_computes(
     }
 
 
+@needs_cmake
+@pytest.mark.slow
+def test_a_familys_export_says_how_to_decide_for_a_family_and_builds(tmp_path: Path) -> None:
+    contents = exported("a123_26650_10C")
+    write_core(tmp_path / "core", contents)
+    readme = contents["README.md"].decode()
+    code = blocks(readme, "c")
+    assert "family_observe" in code
+    assert "rcbf_solve" not in code
+    (tmp_path / "CMakeLists.txt").write_text(
+        PROJECT.format(flags="", readme=blocks(readme, "cmake"))
+    )
+    (tmp_path / "application.c").write_text(f"{code}\nint main(void) {{ return 0; }}")
+    shutil.copy(ANSWERS, tmp_path)
+    build(tmp_path, tmp_path / "build")
+
+
 def test_an_export_holds_the_sources_as_they_are_and_what_is_generated_for_the_pair() -> None:
     contents = exported("paper_calibrated")
     assert [*contents] == sorted(contents)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bms.errors import InputError
 from bms.firmware.batches import ChargeBatch, DecisionBatch, EstimateBatch
 from bms.firmware.calibration import calibration_bytes, calibration_hashes
 from bms.firmware.controller import Firmware
@@ -81,3 +82,15 @@ def test_a_calibration_is_checked_against_a_whole_header_only():
     assert calibration_status(part, bytes(HEADER_LENGTH)) == "IMAGE_NO_MAGIC"
     with pytest.raises(ValueError, match=f"{HEADER_LENGTH} bytes"):
         calibration_status(part, bytes(HEADER_LENGTH - 1))
+
+
+def test_one_state_does_not_decide_for_a_family():
+    with pytest.raises(InputError, match="one state does not decide for a family of cells"):
+        Firmware("a123_26650").solve(
+            soc=0.5,
+            core_temperature_K=300.0,
+            surface_temperature_K=300.0,
+            coolant_temperature_K=300.0,
+            cooling_power_W=1.0,
+            reference_current_A=-10.0,
+        )
