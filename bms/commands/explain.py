@@ -8,8 +8,6 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from bms.arrays import Array
 from bms.commands import options
@@ -25,6 +23,7 @@ from bms.studies.explanation import explain as explained
 from bms.studies.explanation.plots import layer_figure, sensitivity_figure
 from bms.studies.explanation.report import Subject, as_latex, as_text
 from bms.studies.explanation.report import as_json as as_content
+from bms.text_table import TextTable
 from bms.waiting import waiting
 
 _PROFILES = 30
@@ -75,7 +74,7 @@ def explain(
     if as_json:
         typer.echo(content)
         return
-    table = Table("edge", "form", "RMSE K", "largest K", "R2")
+    table = TextTable("edge", "form", "RMSE K", "largest K", "R2")
     for layer in result.edges:
         for edge in (edge for row in layer for edge in row):
             table.add_row(
@@ -85,7 +84,7 @@ def explain(
                 f"{edge.max_abs_error_K:.5f}",
                 f"{edge.r_squared:.6f}",
             )
-    Console().print(table)
+    table.print()
     for symbol, expression in result.formula.steps:
         typer.echo(f"{symbol} = {expression}")
     typer.echo(
