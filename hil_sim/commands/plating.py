@@ -34,10 +34,20 @@ def plating(
         str, typer.Option("--physics", help=f"PyBaMM's model: {' or '.join(MODELS)}.")
     ] = "spme",
     temperatures: Annotated[
-        str, typer.Option("--temperatures", help="Rows of the map: temperatures in K, up to 8.")
+        str,
+        typer.Option(
+            "--temperatures",
+            show_default=False,  # one long word, which a narrow terminal would cut
+            help="Rows of the map: temperatures in K, up to 8. Default: 8 from 273.15 to 323.15.",
+        ),
     ] = _TEMPERATURES,
     soc: Annotated[
-        str, typer.Option("--soc", help="Columns of the map: states of charge, up to 8.")
+        str,
+        typer.Option(
+            "--soc",
+            show_default=False,
+            help="Columns of the map: states of charge, up to 8. Default: 8 from 0 to 1.",
+        ),
     ] = _CHARGES,
     most_A: Annotated[
         float,
