@@ -15,7 +15,7 @@ from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
 from bms.data.simulate import joined
 from bms.errors import InputError
-from bms.files import write_text
+from bms.files import make_folder, png, write_bytes, write_text
 from bms.kan.network import INPUT_NAMES
 from bms.model.model_file import KanModel, load_model
 from bms.presets import load_preset
@@ -62,12 +62,10 @@ def explain(
         for number in range(len(loaded.network.layers))
     }
     figures["sensitivity.png"] = sensitivity_figure(result)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        for name, figure in figures.items():
-            figure.savefig(out / name, dpi=_DPI, metadata={"Software": None})
-    except OSError as error:
-        raise InputError(f"{out}: cannot be written ({error.strerror}); choose a folder") from None
+    pictures = {name: png(figure, _DPI) for name, figure in figures.items()}
+    make_folder(out)
+    for name, picture in pictures.items():
+        write_bytes(out / name, picture)
     write_text(out / "explanation.txt", as_text(subject, result))
     write_text(out / "explanation.tex", as_latex(subject, result))
     write_text(out / "explanation.json", content + "\n")
