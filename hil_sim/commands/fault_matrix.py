@@ -120,6 +120,9 @@ def _print(console: Console, result: MatrixResult, out: Path | None) -> None:
     for verdict in result.red:
         failures = escape(f"{verdict.row.name}: {'; '.join(verdict.failures)}")
         console.print(f"[red]{failures}[/red]", highlight=False)
+    for reason, names in result.not_applied.items():
+        text = f"does not apply to '{result.settings.preset.name}': {', '.join(names)}: {reason}"
+        console.print(text, markup=False, highlight=False)
     style = "red" if result.red else "green"
     seconds = f"{result.wall_time_s:.1f} s"
     console.print(f"[{style}]{result.sentence}[/{style}] ({seconds}); periods count from the fault")
