@@ -36,7 +36,7 @@ _LOWEST_VOLTAGE_V = 1.5
 # At 10C the ohmic drop is 0.26 to 0.29 V; twice that above the limit is a wire, not a cell.
 _VOLTAGE_HEADROOM_V = 0.6
 
-DEVIATIONS = {
+_DEVIATIONS = {
     # Current against the last command, which the charger answers a period later. A growing current
     # is one step of the growth limit behind (0.23 A: 1C per second for 0.1 s); a faster fall is
     # over before the three periods that the fault takes.
@@ -58,7 +58,7 @@ DEVIATIONS = {
     "surface_deficit_K": 1.0,
 }
 
-_FAMILYDEVIATIONS = {
+_FAMILY_DEVIATIONS = {
     # Beyond what a cell of the family can have, which contains resistance, polarisation and age.
     "voltage_deviation_V": 0.05,
 }
@@ -97,5 +97,5 @@ def plausibility_fields(preset: Preset) -> dict[str, Any]:
         ]
     }
     believed = {name: {"low": low, "high": high} for name, (low, high) in ranges.items()}
-    deviations = DEVIATIONS | ({} if preset.cell.interval is None else _FAMILYDEVIATIONS)
+    deviations = _DEVIATIONS | ({} if preset.cell.interval is None else _FAMILY_DEVIATIONS)
     return believed | deviations | errors

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal, get_args
 
-from bms.calibration.plausibility import DEVIATIONS
+from bms.calibration.plausibility import plausibility_fields
 from bms.presets import Preset
 from hil_sim.bus.catalog import ActiveConstraint
 from hil_sim.run.result import RunResult
@@ -56,28 +56,34 @@ def _time_to_fill(preset: Preset, result: RunResult, onset: int) -> str | None:
     )
 
 
+def _permitted_A(preset: Preset) -> float:
+    """By how much the measured current may miss the command."""
+    return float(plausibility_fields(preset)["current_deviation_A"])
+
+
 def _strong_current(preset: Preset, result: RunResult, onset: int) -> str | None:
     series = result.series
     flowing_A = -series.current_A[series.charge_period.index(onset) - 1]
-    if _SHARE * flowing_A >= 2.0 * CURRENT_DEVIATION_A:
+    permitted_A = _permitted_A(preset)
+    if _SHARE * flowing_A >= 2.0 * permitted_A:
         return None
     return (
         f"before the fault {flowing_A:.1f} A flow, of which {_SHARE:.0%} are no clear deviation: "
-        f"{CURRENT_DEVIATION_A:g} A are permitted"
+        f"{permitted_A:g} A are permitted"
     )
 
 
 def _growing_current(preset: Preset, result: RunResult, onset: int) -> str | None:
     growth_A = preset.limits.current_growth_A_per_s * preset.timing.sampling_period_s
-    if _PERIODS * growth_A >= 2.0 * CURRENT_DEVIATION_A:
+    permitted_A = _permitted_A(preset)
+    if _PERIODS * growth_A >= 2.0 * permitted_A:
         return None
     return (
         f"with this preset the current grows by {growth_A:.3g} A a period, so that the permitted "
-        f"deviation of {CURRENT_DEVIATION_A:g} A takes longer than {_PERIODS} periods"
+        f"deviation of {permitted_A:g} A takes longer than {_PERIODS} periods"
     )
 
 
-CURRENT_DEVIATION_A = DEVIATIONS["current_deviation_A"]
 _SHARE = 0.2
 """Of the current, by which a charger of the matrix misses its command."""
 _PERIODS = 10
