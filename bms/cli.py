@@ -18,6 +18,7 @@ from typer.main import get_command, get_group
 
 from bms.errors import BmsError
 from bms.interruption import EXIT_INTERRUPTED, INTERRUPTED, prompt_interrupts
+from bms.plain_text import write_plainly
 
 EXIT_DONE, EXIT_CHECK_FAILED, EXIT_WRONG_USE = 0, 1, 2
 
@@ -79,6 +80,7 @@ def main() -> None:
         os.environ.setdefault(variable, "1")
     # It tells of its own caches, for example where the home folder cannot be written.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    write_plainly()
     try:
         with prompt_interrupts():
             code = application(sys.argv[1:])(standalone_mode=False)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import os
 import tempfile
 from pathlib import Path
+from typing import Any, Protocol
 
 from bms.errors import InputError
 
@@ -17,6 +19,20 @@ def make_folder(path: Path) -> None:
         raise InputError(
             f"{path}: cannot be made ({error.strerror}); choose another folder"
         ) from None
+
+
+class Drawn(Protocol):
+    """What writes itself as a picture, such as matplotlib's Figure."""
+
+    def savefig(self, fname: Any, **options: Any) -> None:
+        """Write it to a file."""
+
+
+def png(figure: Drawn, dpi: int) -> bytes:
+    """The figure as PNG, the same bytes on each run with the same matplotlib."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})
+    return buffer.getvalue()
 
 
 def write_text(path: Path, text: str) -> None:

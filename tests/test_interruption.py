@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -10,6 +11,10 @@ import time
 from pathlib import Path
 
 import pytest
+
+from bms.model.model_file import shipped_model_path
+from tests.bms.kan_samples import write_recording
+from tests.firmware.ports import ROOT, built, needs_emulator
 
 # What takes long tells how far it is; here from its first step on, which is its sign of life.
 PROGRAM = (
@@ -32,6 +37,12 @@ COMMANDS = {
     "cost": ("cost", "--out", "out"),
     "bench": ("bench",),
     "compare-estimators": ("compare-estimators", "--preset", "lin2014"),
+    "identify": ("identify", "--data", "RECORDING", "--out", "cell.toml"),
+    "explain": ("explain", "--model", "MODEL", "--out", "out"),
+    "bound": ("bound", "--model", "MODEL", "--out", "out"),
+    "plating": ("plating", "--out", "map.toml"),
+    "replay": ("replay", "--against", "ROOT", "ROOT", "ROOT/tests/hil_sim/golden"),
+    "compare-targets": ("compare-targets", "--target", "qemu:mps2-an386", "--build", "IMAGES"),
 }
 KEPT = {"campaign.json", "chunks"}
 """What `bms campaign --resume` goes on with."""
@@ -46,12 +57,27 @@ def processes_of_group(group: int) -> list[str]:
     return [args for pgid, stat, args in rows if int(pgid) == group and stat[0] != "Z"]
 
 
+def arguments(name, folder):
+    """Words of a command; what it reads is made in the folder."""
+    places = {"MODEL": shipped_model_path("lin2014"), "ROOT": ROOT}
+    if "RECORDING" in COMMANDS[name]:
+        places["RECORDING"] = write_recording(folder / "run.csv", rows=2000)
+    if "IMAGES" in COMMANDS[name]:
+        places["IMAGES"] = built("mps2_an386").parent
+    words = map(str, COMMANDS[name])
+    return [re.sub("|".join(places), lambda found: str(places[found[0]]), word) for word in words]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("is_for_all", [True, False], ids=["process group", "main process"])
-@pytest.mark.parametrize("name", COMMANDS)
-def test_ctrl_c_ends_a_command_at_once(name, is_for_all, tmp_path):
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=needs_emulator) if n == "compare-targets" else n for n in COMMANDS],
+)
+def test_ctrl_c_ends_a_command_at_once(name, is_for_all, tmp_path, tmp_path_factory):
+    words = arguments(name, tmp_path_factory.mktemp("inputs"))
     with subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, *map(str, COMMANDS[name])],
+        [sys.executable, "-c", PROGRAM, *words],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

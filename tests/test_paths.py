@@ -35,6 +35,16 @@ COMMANDS = {
     "fault-matrix": ("fault-matrix", "--rows", "lost once*", "--jobs", "1", "--out", "LOCKED"),
     "compare-targets": ("compare-targets", "--build", "LOCKED"),
     "flash": ("flash", "--image", "LOCKED"),
+    "bench": ("bench", "--quick", "--section", "decision", "--preset", "LOCKED.toml"),
+    "cost": ("cost", "--out", "LOCKED/cost.png"),
+    "plating": ("plating", "--temperatures", "0,1", "--out", "LOCKED/map.toml"),
+    "identify, data": ("identify", "--data", "LOCKED"),
+    "identify, preset": ("identify", "--data", "run.csv", "--preset", "LOCKED.toml"),
+    "import-pykan": ("import-pykan", "LOCKED", "--out", "model.json"),
+    "ecu": ("ecu", "--bus", "udp_multicast:239.74.163.87", "--preset", "LOCKED.toml"),
+    "plant": ("plant", "--bus", "udp_multicast:239.74.163.87", "--log", "LOCKED/run.log"),
+    "monitor": ("monitor", "--bus", "udp_multicast:239.74.163.87", "--preset", "LOCKED.toml"),
+    "verify": ("verify", "--preset", "LOCKED.toml"),
 }
 
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator, ScalarFormatter
 
 from bms.bounds.record import TheoremBound
-from bms.errors import InputError
+from bms.files import png, write_bytes
 
 
 def write_chart(theorem: TheoremBound, path: Path) -> None:
@@ -58,7 +58,4 @@ def write_chart(theorem: TheoremBound, path: Path) -> None:
     axes.set_ylabel("distance to the smooth network (K)")
     axes.grid(True, which="major", alpha=0.3)
     axes.legend(fontsize="small", loc="lower left")
-    try:
-        figure.savefig(path, dpi=130, metadata={"Software": None})
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+    write_bytes(path, png(figure, 130))

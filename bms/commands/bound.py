@@ -9,9 +9,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from bms.bounds.chart import write_chart
 from bms.bounds.conformal import CONFIDENCE
@@ -28,6 +25,7 @@ from bms.model.model_file import KanModel, load_model
 from bms.model.pair import check_pair
 from bms.presets import load_preset
 from bms.progress import Progress
+from bms.text_table import TextTable
 from bms.waiting import waiting
 
 _ROUND_OFF = 1e-9
@@ -134,7 +132,7 @@ def _write(folder: Path, bounds: ErrorBounds, result: dict[str, Any]) -> None:
 
 
 def _print(model: str, bounds: ErrorBounds, result: dict[str, Any]) -> None:
-    table = Table("bound", "K", "rests on", title=escape(f"{model}, {result['source']}"))
+    table = TextTable("bound", "K", "rests on", title=f"{model}, {result['source']}")
     theorem, worst, conformal = bounds.theorem, bounds.worst_case, bounds.conformal
     own_K = "none" if theorem.model_K is None else f"{theorem.model_K:.4f}"
     table.add_row(f"theorem, G = {theorem.model_grid}", own_K, _theorem_basis(bounds))
@@ -147,11 +145,11 @@ def _print(model: str, bounds: ErrorBounds, result: dict[str, Any]) -> None:
         + ("; blocks are only roughly exchangeable" if conformal.unit == "block" else ""),
     )
     table.add_row("held-out data", f"{bounds.held_out_K:.4f}", "largest error on them")
-    Console().print(table)
-    sweep = Table("G", "largest distance K", "RMS distance K")
+    table.print()
+    sweep = TextTable("G", "largest distance K", "RMS distance K")
     for row in zip(theorem.grids, theorem.largest_K, theorem.rms_K):
         sweep.add_row(str(row[0]), f"{row[1]:.3e}", f"{row[2]:.3e}")
-    Console().print(sweep)
+    sweep.print()
     parts = " + ".join(f"{name} {value:.4f}" for name, value in result["parts_K"].items())
     typer.echo(f"e_max {result['error_bound_K']:.4f} K = {parts}; estimate: {bounds.used}")
     verdict = "covers this" if result["holds"] else "is TOO SMALL"

@@ -9,10 +9,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from bms.commands import options
 from bms.data.measurements import recording_sha256
@@ -28,10 +24,10 @@ from bms.studies.rivals.lagged import all_lags
 from bms.studies.rivals.recorded import recorded_problem
 from bms.studies.rivals.simulated import simulated_problem
 from bms.studies.rivals.verdict import verdict
+from bms.text_table import TextTable
 from bms.waiting import waiting
 
 DEFAULT_CELL = "lin2014"
-_TABLE_WIDTH = 140
 
 
 def compare_estimators(
@@ -181,28 +177,25 @@ def _content(row: Row) -> dict[str, Any]:
 def _print(comparison: Comparison, quick: bool) -> None:
     scopes = list(comparison.rows[0].errors)
     counted = comparison.rows[0].counted
-    title = escape(comparison.title) + (", quick fits" if quick else "")
-    table = Table(
-        title=title,
-        caption="errors in K; bytes, multiply-adds and time of one estimate in float32 C",
-        box=SIMPLE_HEAD,
-    )
-    table.add_column("estimator", no_wrap=True)
     headings = [f"RMSE\n{scope.replace(' ', chr(10))}" for scope in scopes]
     headings.append(f"largest\n{counted.replace(' ', chr(10))}")
     has_read = comparison.rows[0].read_rmse_K is not None
     if has_read:
         headings.append("RMSE\nwith\nsensors")
     headings += ["param-\neters", "bytes", "multi-\nply-\nadds", "time\nns"]
-    for heading in headings:
-        table.add_column(heading, justify="right", no_wrap=True)
+    table = TextTable(
+        "estimator",
+        *headings,
+        title=comparison.title + (", quick fits" if quick else ""),
+        caption="errors in K; bytes, multiply-adds and time of one estimate in float32 C",
+    )
     for row in comparison.rows:
         if not row.errors:
-            table.add_row(row.name)
+            table.add_row(row.name, *("" for _ in headings))
             continue
         cost, read_K, time_ns = row.cost, row.read_rmse_K, row.time_per_estimate_ns
         table.add_row(
-            escape(row.name),
+            row.name,
             *(f"{row.errors[scope].rmse_K:.4f}" for scope in scopes),
             f"{row.errors[counted].max_abs_error_K:.4f}",
             *([] if read_K is None else [f"{read_K:.4f}"]),
@@ -211,10 +204,7 @@ def _print(comparison: Comparison, quick: bool) -> None:
             "" if cost is None else str(cost.multiply_adds),
             "" if time_ns is None else f"{time_ns:.1f}",
         )
-    console = Console()
-    # Lines longer than the terminal are better than figures cut off.
-    console.width = max(console.width, _TABLE_WIDTH)
-    console.print(table)
+    table.print()
     for row in comparison.rows:
         if row.remark:
             typer.echo(f"{row.name}: {row.remark}")

@@ -9,9 +9,6 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from bms.arrays import Array, Mask
 from bms.commands import options
@@ -24,6 +21,7 @@ from bms.kan.accuracy import error_figures
 from bms.model.model_file import KanModel, load_model
 from bms.model.pair import check_pair
 from bms.presets import load_preset
+from bms.text_table import TextTable
 
 
 class Engine(str, Enum):
@@ -67,10 +65,10 @@ def evaluate(
     if as_json:
         typer.echo(json.dumps(result, indent=1))
     else:
-        table = Table("figure", "value", title=escape(f"{model}, engine {engine.value}"))
+        table = TextTable("figure", "value", title=f"{model}, engine {engine.value}")
         for name, value in result.items():
             table.add_row(name, f"{value:.4f}" if isinstance(value, float) else str(value))
-        Console().print(table)
+        table.print()
 
 
 def _estimate(

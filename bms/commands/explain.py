@@ -8,8 +8,6 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from bms.arrays import Array
 from bms.commands import options
@@ -17,7 +15,7 @@ from bms.data.datasets import simulated_split
 from bms.data.measurements import read_measurements
 from bms.data.simulate import joined
 from bms.errors import InputError
-from bms.files import write_text
+from bms.files import make_folder, png, write_bytes, write_text
 from bms.kan.network import INPUT_NAMES
 from bms.model.model_file import KanModel, load_model
 from bms.presets import load_preset
@@ -25,6 +23,7 @@ from bms.studies.explanation import explain as explained
 from bms.studies.explanation.plots import layer_figure, sensitivity_figure
 from bms.studies.explanation.report import Subject, as_latex, as_text
 from bms.studies.explanation.report import as_json as as_content
+from bms.text_table import TextTable
 from bms.waiting import waiting
 
 _PROFILES = 30
@@ -63,19 +62,17 @@ def explain(
         for number in range(len(loaded.network.layers))
     }
     figures["sensitivity.png"] = sensitivity_figure(result)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        for name, figure in figures.items():
-            figure.savefig(out / name, dpi=_DPI, metadata={"Software": None})
-    except OSError as error:
-        raise InputError(f"{out}: cannot be written ({error.strerror}); choose a folder") from None
+    pictures = {name: png(figure, _DPI) for name, figure in figures.items()}
+    make_folder(out)
+    for name, picture in pictures.items():
+        write_bytes(out / name, picture)
     write_text(out / "explanation.txt", as_text(subject, result))
     write_text(out / "explanation.tex", as_latex(subject, result))
     write_text(out / "explanation.json", content + "\n")
     if as_json:
         typer.echo(content)
         return
-    table = Table("edge", "form", "RMSE K", "largest K", "R2")
+    table = TextTable("edge", "form", "RMSE K", "largest K", "R2")
     for layer in result.edges:
         for edge in (edge for row in layer for edge in row):
             table.add_row(
@@ -85,7 +82,7 @@ def explain(
                 f"{edge.max_abs_error_K:.5f}",
                 f"{edge.r_squared:.6f}",
             )
-    Console().print(table)
+    table.print()
     for symbol, expression in result.formula.steps:
         typer.echo(f"{symbol} = {expression}")
     typer.echo(

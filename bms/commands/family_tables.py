@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rich.console import Console
-from rich.table import Table
 
+from bms.text_table import TextTable
 from bms.verification.family import FamilyVerification
 
 
 def print_family(result: FamilyVerification) -> None:
     """Relations that the argument needs, violations found, and what sensors could hide."""
     console = Console()
-    table = Table("what the argument needs", "holds", "at least", "is")
+    table = TextTable("what the argument needs", "holds", "at least", "is")
     for relation in result.relations:
         table.add_row(
             relation.name,
@@ -21,7 +21,7 @@ def print_family(result: FamilyVerification) -> None:
             f"{relation.needs:.5g}",
             f"{relation.has:.5g}",
         )
-    console.print(table)
+    table.print(console)
     for relation in result.relations:
         if not relation.holds:
             console.print(
@@ -33,7 +33,7 @@ def print_family(result: FamilyVerification) -> None:
             f"NOT certified: {violation.claim} by {violation.by:.3g}{_at(violation.state)}; "
             "report the preset: its constants should have covered this"
         )
-    lies = Table("one wrong sensor, unseen", "by", "core over K", "voltage over V", "taken for")
+    lies = TextTable("one wrong sensor, unseen", "by", "core over K", "voltage over V", "taken for")
     for lie in result.lies:
         lies.add_row(
             lie.sensor,
@@ -42,7 +42,7 @@ def print_family(result: FamilyVerification) -> None:
             f"{lie.voltage_excess_V:.3f}",
             lie.why,
         )
-    console.print(lies)
+    lies.print(console)
     verdict = "certified" if result.certified else "NOT certified"
     console.print(
         f"{result.preset}: {verdict} for every cell of its family, {result.held_s:g} s from each "

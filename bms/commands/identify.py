@@ -10,8 +10,6 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands import options
@@ -32,6 +30,7 @@ from bms.identification.needed import (
 )
 from bms.identification.preset_toml import preset_toml
 from bms.presets import Preset, load_preset
+from bms.text_table import TextTable
 from bms.waiting import waiting
 
 _DIGITS = 6
@@ -163,9 +162,7 @@ def _content(result: Identification) -> dict[str, Any]:
 
 def _print(result: Identification, data: Path) -> None:
     console = Console()
-    table = Table()
-    for heading in ("parameter", "value", "standard error", "preset", "remark"):
-        table.add_column(heading, no_wrap=heading == "parameter")
+    table = TextTable("parameter", "value", "standard error", "preset", "remark")
     for parameter in result.parameters:
         error = parameter.standard_error
         table.add_row(
@@ -175,8 +172,8 @@ def _print(result: Identification, data: Path) -> None:
             f"{parameter.start:.5g}",
             parameter.remark,
         )
-    console.print(table)
-    table = Table("rows", "number", "core RMSE K", "surface RMSE K", title=escape(str(data)))
+    table.print(console)
+    table = TextTable("rows", "number", "core RMSE K", "surface RMSE K", title=str(data))
     for name, residuals in (("fitted", result.fitted), ("held out", result.held_out)):
         if residuals is not None:
             table.add_row(
@@ -185,7 +182,7 @@ def _print(result: Identification, data: Path) -> None:
                 f"{residuals.core_rmse_K:.4f}",
                 f"{residuals.surface_rmse_K:.4f}",
             )
-    console.print(table)
+    table.print(console)
     console.print(f"{result.starts_at_minimum} of {result.starts} starts ended in this minimum")
     if (strongest := result.strongest_correlation) is not None:
         one, other, value = strongest
@@ -213,15 +210,14 @@ def _told(needed: NeededUncertainty) -> dict[str, Any]:
 def _print_disturbance(needed: NeededUncertainty, *, is_family: bool) -> None:
     console = Console()
     names = list(needed.disturbances)
-    table = Table(title="disturbance that the fitted model needs, in K/s, over all rows")
-    table.add_column("", no_wrap=True)
-    for name in names:
-        table.add_column(name, justify="right")
+    table = TextTable(
+        "", *names, title="disturbance that the fitted model needs, in K/s, over all rows"
+    )
     for heading, *cells in zip(*(_column(needed.disturbances[name]) for name in names)):
         table.add_row(heading[0], *(cell[1] for cell in (heading, *cells)))
-    console.print(table)
+    table.print(console)
     for name, reason in needed.untold.items():
-        console.print(f"{name}: not told: {escape(reason)}")
+        console.print(f"{name}: not told: {reason}", markup=False)
     console.print(
         f"'others cover': share of each of {STRETCHES} stretches under the bound of the others"
     )

@@ -10,8 +10,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from bms.commands import options
 from bms.errors import InputError
@@ -21,6 +19,7 @@ from bms.model.model_file import KanModel, save_model
 from bms.presets import DEFAULT_PRESET, Preset, load_preset
 from bms.pykan_import import imported_model, imported_network, read_checkpoint, with_all_inputs
 from bms.tables import network_tables
+from bms.text_table import TextTable
 from bms.waiting import waiting
 
 
@@ -99,10 +98,10 @@ def import_pykan(
         typer.echo(json.dumps(result, indent=1))
     else:
         typer.echo(f"{out}: model {model.hash[:8]}, error bound {model.error_bound_K:.4f} K")
-        table = Table("figure", "value")
+        table = TextTable("figure", "value")
         for name, value in result.items():
             table.add_row(name, f"{value:.4g}" if isinstance(value, float) else str(value))
-        Console().print(table)
+        table.print()
 
 
 def _box(preset: Preset, inputs: int) -> tuple[list[float], list[float]]:

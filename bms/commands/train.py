@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from bms.commands import options
 from bms.errors import InputError
@@ -17,6 +15,7 @@ from bms.kan.settings import TrainingSettings
 from bms.model.make import model_for_measurements, model_for_preset
 from bms.model.model_file import KanModel, save_model
 from bms.presets import load_preset
+from bms.text_table import TextTable
 from bms.validation import parse
 from bms.waiting import waiting
 
@@ -95,7 +94,7 @@ def train(
             model = model_for_preset(load_preset(preset), settings, wait.reach)
     save_model(model, out)
     typer.echo(f"{out}: model {model.hash[:8]}, error bound {model.error_bound_K:.4f} K")
-    Console().print(_table(model))
+    _table(model).print()
 
 
 def _settings(**values: object) -> TrainingSettings:
@@ -108,10 +107,8 @@ def _require_writable(out: Path) -> None:
         raise InputError(f"{out}: cannot be written; choose a file in a folder that can")
 
 
-def _table(model: KanModel) -> Table:
-    table = Table()
-    for heading in ("split", "profiles", "RMSE K", "largest K", "bias K", "samples"):
-        table.add_column(heading, justify="right")
+def _table(model: KanModel) -> TextTable:
+    table = TextTable("split", "profiles", "RMSE K", "largest K", "bias K", "samples")
     for split, errors in model.errors.items():
         kinds = {"constant": errors.constant, "dynamic": errors.dynamic, "all": errors.overall}
         for kind, figures in kinds.items():

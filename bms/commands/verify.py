@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands import options
@@ -17,6 +16,7 @@ from bms.errors import InputError
 from bms.model.model_file import KanModel
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET, Preset
+from bms.text_table import TextTable
 from bms.verification import (
     CLASHING_DELTA4,
     LARGEST_BOXES,
@@ -97,7 +97,7 @@ def _verify_family(preset: Preset, model: KanModel, as_json: bool) -> int:
 
 def _print(result: Verification) -> None:
     console = Console()
-    table = Table("barrier", "certified", "boxes", "open", "counter-example")
+    table = TextTable("barrier", "certified", "boxes", "open", "counter-example")
     for barrier in result.barriers:
         certificate = barrier.certificate
         table.add_row(
@@ -107,7 +107,7 @@ def _print(result: Verification) -> None:
             str(certificate.open_boxes),
             _example(barrier.counter_example),
         )
-    console.print(table)
+    table.print(console)
     for barrier in result.barriers:
         if barrier.domain is not None:
             domain = barrier.domain
@@ -165,7 +165,7 @@ def _finding(finding: Finding) -> str:
 
 
 def _print_costs(costs: list[SlipCost]) -> None:
-    table = Table(
+    table = TextTable(
         "slip", "certified", "core excess K", "surface excess K", "voltage excess V",
         "charge s", "core peak K", "surface peak K",
     )  # fmt: skip
@@ -181,7 +181,7 @@ def _print_costs(costs: list[SlipCost]) -> None:
             f"{cost.core_peak_K:.3f}",
             f"{cost.surface_peak_K:.3f}",
         )
-    Console().print(table)
+    table.print()
 
 
 def _example(example: CounterExample | None) -> str:

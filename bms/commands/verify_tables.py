@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands import options
 from bms.errors import InputError
 from bms.model.model_file import KanModel, load_model, shipped_models
+from bms.text_table import TextTable
 from bms.verification.exhaustive import EdgeCheck, check_network
 from bms.waiting import waiting
 
@@ -81,7 +80,7 @@ def _row(name: str, model: KanModel, check: EdgeCheck) -> dict[str, Any]:
 
 
 def _print(rows: list[dict[str, Any]], stride: int, holds: bool) -> None:
-    table = Table(
+    table = TextTable(
         "model", "edge", "arguments", "worst error", "at argument", "stated bound", "wrong flags"
     )
     for row in rows:
@@ -94,7 +93,7 @@ def _print(rows: list[dict[str, Any]], stride: int, holds: bool) -> None:
             f"{row['error_bound']:.3e}",
             str(row["wrong_flags"]),
         )
-    Console().print(table)
+    table.print()
     what = "all 2^32 arguments" if stride == 1 else f"every {stride}th argument and the special"
     verdict = "hold" if holds else "do NOT hold"
     typer.echo(f"stated bounds {verdict} for {what}; errors in units of the edge's value")

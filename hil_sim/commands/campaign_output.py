@@ -4,27 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
-from rich.box import SIMPLE
 from rich.console import Console
-from rich.table import Table
 
+from bms.text_table import TextTable
 from hil_sim.studies.campaign.rows import FIRMWARE
 
 
 def print_classes(console: Console, summary: dict[str, Any]) -> None:
     """Tables of the cells inside and outside the modelled uncertainty."""
     for name, cells in summary["classes"].items():
-        table = Table(
+        table = TextTable(
+            *_HEADINGS,
             title=f"{cells['runs']} cells {name} the modelled uncertainty: runs that cross a limit",
-            title_justify="left",
-            box=SIMPLE,
-            padding=(0, 1, 0, 0),
         )
-        for heading in _HEADINGS:
-            table.add_column(heading, justify="left" if heading == _HEADINGS[0] else "right")
         for controller, figures in cells["controllers"].items():
             table.add_row(controller, *_cells(figures))
-        console.print(table)
+        table.print(console)
         if cells["estimate_beyond_error_bound"]:
             console.print(
                 f"in {cells['estimate_beyond_error_bound']} of them the core estimate was wrong by "
@@ -34,17 +29,13 @@ def print_classes(console: Console, summary: dict[str, Any]) -> None:
 
 def print_family(console: Console, summary: dict[str, Any]) -> None:
     """Table of what went wrong with cells of the preset's family, and the firmware's worst runs."""
-    table = Table(
+    table = TextTable(
+        *_FAMILY_HEADINGS,
         title=f"{summary['runs']} cells of the preset's family: runs in which something went wrong",
-        title_justify="left",
-        box=SIMPLE,
-        padding=(0, 1, 0, 0),
     )
-    for heading in _FAMILY_HEADINGS:
-        table.add_column(heading, justify="left" if heading == "" else "right")
     for controller, figures in summary["controllers"].items():
         table.add_row(controller, *_family_cells(figures))
-    console.print(table)
+    table.print(console)
     console.print(
         "soc: true state of charge over 1.005; early: complete below 0.96; stops: runs with a stop "
         "to 0 A; done: complete in time; full: of a true 0.99 or more"

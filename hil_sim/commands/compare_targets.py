@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
+from rich.text import Text
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands.options import JsonOption
 from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
+from bms.text_table import TextTable, red
 from bms.waiting import waiting
 from hil_sim.commands import options
 from hil_sim.commands.fault_matrix import chosen_rows
@@ -154,17 +154,13 @@ def _print(
     agreements: Sequence[Sequence[Agreement]],
     left_out: dict[str, str],
 ) -> None:
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1))
-    table.add_column("run on the host")
-    table.add_column("periods", justify="right")
-    table.add_column("frames", justify="right")
-    for by_target in agreements:
-        table.add_column(by_target[0].target)
+    targets = (by_target[0].target for by_target in agreements)
+    table = TextTable("run on the host", "periods", "frames", *targets)
     for scenario, *by_scenario in zip(scenarios, *agreements):
         counts = (len(scenario.recording.periods), _frame_count(scenario))
         cells = [_verdict(agreement) for agreement in by_scenario]
-        table.add_row(escape(scenario.name), *map(str, counts), *cells)
-    console.print(table)
+        table.add_row(scenario.name, *map(str, counts), *cells)
+    table.print(console)
     for by_target in agreements:
         differing = [one for one in by_target if not one.comparison.is_equal]
         if differing:
@@ -182,9 +178,9 @@ def _print(
         console.print(f"[{style}]{escape(text)}[/{style}] ({frames} frames)", highlight=False)
 
 
-def _verdict(agreement: Agreement) -> str:
+def _verdict(agreement: Agreement) -> str | Text:
     first = agreement.comparison.first
-    return "same" if first is None else f"[red]differs from period {first.period}[/red]"
+    return "same" if first is None else red(f"differs from period {first.period}")
 
 
 def _print_first(console: Console, agreement: Agreement) -> None:
@@ -195,7 +191,7 @@ def _print_first(console: Console, agreement: Agreement) -> None:
     for frame in agreement.frames:
         _say(console, f"  {_difference(frame, agreement.target)}")
     signals = Signals(agreement.scenario.recording.database)
-    console.print(first_table(first, signals, (HOST, agreement.target)))
+    first_table(first, signals, (HOST, agreement.target)).print(console)
 
 
 def _difference(frame: FrameDifference, target: str) -> str:

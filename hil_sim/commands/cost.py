@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands.options import JsonOption, PresetOption, seed_option
 from bms.firmware.calibration import calibration_bytes
 from bms.model.model_file import load_shipped_model
 from bms.presets import DEFAULT_PRESET, load_preset
+from bms.text_table import TextTable
 from bms.waiting import waiting
 from hil_sim.report.folder import OutputFolder
 from hil_sim.studies.cost import PARTS, CostReport, measure_cost
@@ -94,7 +93,7 @@ def cost(
 
 
 def _print(reports: list[CostReport], charges: int, states: int) -> None:
-    table = Table("board", "instructions of", "least", "median", "worst", "worst of the search")
+    table = TextTable("board", "instructions of", "least", "median", "worst", "worst of the search")
     for report in reports:
         for kind, figures in report.costs.items():
             table.add_row(
@@ -106,7 +105,7 @@ def _print(reports: list[CostReport], charges: int, states: int) -> None:
                 str(figures.search_worst),
             )
         table.add_section()
-    Console().print(table)
+    table.print()
     typer.echo(
         f"least, median and worst over a whole charge; searched: {charges} beginnings of charges, "
         f"and {states} states a generation. Instructions, not cycles."

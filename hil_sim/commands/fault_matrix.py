@@ -10,10 +10,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands.options import (
@@ -26,6 +24,7 @@ from bms.commands.options import (
 from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
+from bms.text_table import TextTable
 from bms.waiting import waiting
 from hil_sim.commands import options
 from hil_sim.fault_matrix.matrix import Row, load_matrix
@@ -100,16 +99,14 @@ def chosen_rows(rows: tuple[Row, ...], patterns: list[str] | None) -> list[Row]:
 
 
 def _print(console: Console, result: MatrixResult, out: Path | None) -> None:
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1), title_justify="left")
-    table.title = escape(f"Fault matrix of '{result.settings.preset.name}'")
-    for name, justify in (
-        ("fault", "left"),
-        ("expected", "left"),
-        ("first 0 A", "right"),
-        ("latches", "left"),
-        ("latched", "right"),
-    ):
-        table.add_column(name, justify=justify)  # type: ignore[arg-type]
+    table = TextTable(
+        "fault",
+        "expected",
+        "first 0 A",
+        "latches",
+        "latched",
+        title=f"Fault matrix of '{result.settings.preset.name}'",
+    )
     for verdict in result.red_first:
         cells = (
             verdict.row.name,
@@ -118,11 +115,14 @@ def _print(console: Console, result: MatrixResult, out: Path | None) -> None:
             latch_text(verdict),
             str(verdict.latched_period or "-"),
         )
-        table.add_row(*map(escape, cells), style="" if verdict.passed else "red")
-    console.print(table)
+        table.add_row(*cells, style="" if verdict.passed else "red")
+    table.print(console)
     for verdict in result.red:
         failures = escape(f"{verdict.row.name}: {'; '.join(verdict.failures)}")
         console.print(f"[red]{failures}[/red]", highlight=False)
+    for reason, names in result.not_applied.items():
+        text = f"does not apply to '{result.settings.preset.name}': {', '.join(names)}: {reason}"
+        console.print(text, markup=False, highlight=False)
     style = "red" if result.red else "green"
     seconds = f"{result.wall_time_s:.1f} s"
     console.print(f"[{style}]{result.sentence}[/{style}] ({seconds}); periods count from the fault")

@@ -9,12 +9,12 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands.options import JsonOption, number_list
 from bms.errors import InputError
 from bms.files import write_text
+from bms.text_table import TextTable
 from bms.waiting import waiting
 from hil_sim.plant.electrochemistry import MODELS, PARAMETER_SET, Electrochemistry
 from hil_sim.studies.plating.current_map import Plating, derive_map, steps
@@ -34,10 +34,20 @@ def plating(
         str, typer.Option("--physics", help=f"PyBaMM's model: {' or '.join(MODELS)}.")
     ] = "spme",
     temperatures: Annotated[
-        str, typer.Option("--temperatures", help="Rows of the map: temperatures in K, up to 8.")
+        str,
+        typer.Option(
+            "--temperatures",
+            show_default=False,  # one long word, which a narrow terminal would cut
+            help="Rows of the map: temperatures in K, up to 8. Default: 8 from 273.15 to 323.15.",
+        ),
     ] = _TEMPERATURES,
     soc: Annotated[
-        str, typer.Option("--soc", help="Columns of the map: states of charge, up to 8.")
+        str,
+        typer.Option(
+            "--soc",
+            show_default=False,
+            help="Columns of the map: states of charge, up to 8. Default: 8 from 0 to 1.",
+        ),
     ] = _CHARGES,
     most_A: Annotated[
         float,
@@ -105,13 +115,11 @@ def _toml(result: Plating, origin: str) -> str:
 
 def _print(result: Plating, origin: str, text: str) -> None:
     console = Console()
-    table = Table(title=f"strongest charging current in A: {origin}")
-    table.add_column("K \\ SoC", no_wrap=True)
-    for charge in result.map.soc:
-        table.add_column(f"{charge:g}", justify="right")
+    charges = (f"{charge:g}" for charge in result.map.soc)
+    table = TextTable("K \\ SoC", *charges, title=f"strongest charging current in A: {origin}")
     for temperature_K, row in zip(result.map.temperature_K, result.map.largest_A):
         table.add_row(f"{temperature_K:g}", *(f"{value_A:.1f}" for value_A in row))
-    console.print(table)
+    table.print(console)
     worst = min(result.checks, key=lambda check: check.anode_potential_V)
     console.print(
         f"least anode potential of the charges at these currents: "

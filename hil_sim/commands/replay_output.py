@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.box import SIMPLE
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
+from bms.text_table import TextTable
 from hil_sim.bus.catalog import NETWORK_VERSION
 from hil_sim.bus.database import Values
 from hil_sim.logs import Unread, described
@@ -71,8 +69,8 @@ class ReplayReport:
             return
         share = f"{comparison.differing_periods} of {comparison.periods}"
         _say(console, f"the ECU says something else in {share} periods")
-        console.print(first_table(comparison.first, self.signals))
-        console.print(_largest_table(comparison, self.signals))
+        first_table(comparison.first, self.signals).print(console)
+        _largest_table(comparison, self.signals).print(console)
         recorded, replayed = (side.charge_Ah for side in self.outcomes)
         _say(console, f"charge commanded: {recorded:.5f} Ah in the log, {replayed:.5f} Ah now")
 
@@ -93,22 +91,19 @@ def print_builds(
     """Print a row for each log, then the faults that one build alone raises."""
     _say(console, f"A: {builds[0]}")
     _say(console, f"B: {builds[1]}, differences are B less A")
-    table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
-    table.add_column("log", no_wrap=True)
-    for heading in ("periods", "differ", "first", "current", "charge"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    table = TextTable("log", "periods", "differ", "first", "current", "charge")
     for verdict in verdicts:
         comparison = verdict.comparison
         first = comparison.first
         table.add_row(
-            escape(verdict.log.name),
+            verdict.log.name,
             str(comparison.periods),
             str(comparison.differing_periods),
             "" if first is None else f"{first.time_s:.1f} s",
             f"{verdict.largest_current_difference_A:.3f} A" if first else "",
             f"{1000.0 * verdict.charge_difference_Ah:+.3f} mAh" if first else "",
         )
-    console.print(table)
+    table.print(console)
     for verdict in verdicts:
         for build, faults in (("A", verdict.gone_faults), ("B", verdict.new_faults)):
             if faults:
@@ -179,36 +174,28 @@ def _verdict_json(verdict: LogVerdict) -> dict[str, Any]:
 
 def first_table(
     first: PeriodDifference, signals: Signals, sides: tuple[str, str] = ("log", "replay")
-) -> Table:
+) -> TextTable:
     """What both sides got in the first period that differs, and what each said."""
     title = f"first difference: period {first.period}, {first.time_s:.3f} s"
-    table = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0))
-    table.add_column("")
-    for side in sides:
-        table.add_column(side, justify="right")
-    table.add_column("unit")
+    table = TextTable("", *sides, "unit", title=title)
     for name in first.received:
-        text = escape(signals.text(name, first.received))
+        text = signals.text(name, first.received)
         table.add_row(f"got {name}", text, text, signals.unit(name))
     table.add_section()
     one, other = first.sides
     for name in dict.fromkeys((*one, *other)):
-        cells = [escape(signals.text(name, side)) for side in (one, other)]
-        style = "bold red" if name in first.signals else None
+        cells = [signals.text(name, side) for side in (one, other)]
+        style = "bold red" if name in first.signals else ""
         mark = "*" if name in first.signals else " "
         table.add_row(f"{mark} {name}", *cells, signals.unit(name), style=style)
     for name in first.signals:
         if name not in one and name not in other:
-            table.add_row(f"* {name}", "differs", "differs", style="bold red")
+            table.add_row(f"* {name}", "differs", "differs", "", style="bold red")
     return table
 
 
-def _largest_table(comparison: Comparison, signals: Signals) -> Table:
-    table = Table(title="all differences", title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0))
-    table.add_column("")
-    for heading in ("periods", "largest"):
-        table.add_column(heading, justify="right")
-    table.add_column("unit")
+def _largest_table(comparison: Comparison, signals: Signals) -> TextTable:
+    table = TextTable("", "periods", "largest", "unit", title="all differences")
     for difference in comparison.signals.values():
         largest = "" if difference.largest is None else f"{difference.largest:.6g}"
         unit = signals.unit(difference.signal)

@@ -8,14 +8,13 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
-from rich import box
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
+from rich.text import Text
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands.options import DEFAULT_PROCESSES, JsonOption, out_folder_option
 from bms.presets import Preset, load_preset
+from bms.text_table import TextTable, red
 from bms.waiting import waiting
 from hil_sim.commands import options
 from hil_sim.report.folder import OutputFolder
@@ -59,7 +58,7 @@ def reproduce(
 def _print(console: Console, presets: Sequence[Preset], results: Results, out: Path | None) -> None:
     for preset in presets:
         for section in sections(preset, results):
-            console.print(_table(section))
+            _table(section).print(console)
             for note in section.notes:
                 console.print(f"  {note}", markup=False, highlight=False)
             console.print()
@@ -72,18 +71,12 @@ def _print(console: Console, presets: Sequence[Preset], results: Results, out: P
         console.print(f"report: {out / 'report.html'}", soft_wrap=True, markup=False)
 
 
-def _table(section: Section) -> Table:
-    title = escape(section.title)
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=0)
-    for number, column in enumerate(section.columns):
-        is_name = number == 0
-        table.add_column(escape(column), justify="left" if is_name else "right", no_wrap=is_name)
+def _table(section: Section) -> TextTable:
+    table = TextTable(*section.columns, title=section.title)
     for row in section.rows:
         table.add_row(*(_cell(text) for text in row))
     return table
 
 
-def _cell(text: str) -> str:
-    if text.endswith(BAD):
-        return f"[red]{escape(text)}[/red]"
-    return escape(text)
+def _cell(text: str) -> str | Text:
+    return red(text) if text.endswith(BAD) else text

@@ -9,12 +9,15 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
-from annotated_types import Ge, Le, Len
+from annotated_types import Ge, Gt, Le, Len
 
 from bms.errors import InputError
+from bms.presets import Preset
+from bms.presets.schema import Initial
 from bms.validation import Positive, parse, read_toml, strict
 from hil_sim.bus.catalog import FirstFault, RequiredName
 from hil_sim.bus.database import MessageCodec, load_codecs
+from hil_sim.fault_matrix.needs import Need
 from hil_sim.faults.base import Fault
 from hil_sim.faults.frames import MessageName
 from hil_sim.faults.plan import check, parse_fault
@@ -34,12 +37,48 @@ Periods = Annotated[int, Ge(1)]
 @strict
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """Where the charge of a row begins; without a figure that of the preset stands."""
+    """Where the charge of a row begins; without a figure that of the preset stands.
+
+    A temperature may be given by how far it is below the preset's lower limit, and the fault's
+    first period by the share of the preset's strongest current to which the current has grown.
+    """
 
     soc: Annotated[float, Ge(0.0), Le(1.0)] | None = None
     temperature_K: Positive | None = None
-    onset_period: Annotated[int, Ge(0)]
+    below_limit_K: Positive | None = None
+    onset_period: Annotated[int, Ge(0)] | None = None
+    onset_current_share: Annotated[float, Gt(0.0), Le(1.0)] | None = None
     after_periods: Periods
+
+    def __post_init__(self) -> None:
+        if self.temperature_K is not None and self.below_limit_K is not None:
+            raise InputError("temperature_K, below_limit_K: give one of them or neither")
+        if (self.onset_period is None) == (self.onset_current_share is None):
+            raise InputError("onset_period, onset_current_share: give one of them")
+
+    def initial(self, preset: Preset) -> Initial:
+        """Where a cell of the preset begins."""
+        initial, limits = preset.initial, preset.limits
+        temperature_K = self.temperature_K
+        if self.below_limit_K is not None:
+            lower_K = min(limits.max_core_temperature_K, limits.max_surface_temperature_K)
+            temperature_K = lower_K - self.below_limit_K
+        return replace(
+            initial,
+            soc=initial.soc if self.soc is None else self.soc,
+            temperature_K=initial.temperature_K if temperature_K is None else temperature_K,
+        )
+
+    def onset(self, preset: Preset) -> int:
+        """Period of the charge that has the fault first."""
+        if self.onset_period is not None:
+            return self.onset_period
+        assert self.onset_current_share is not None
+        strongest_A = abs(preset.limits.reference_current_A)
+        if preset.current_map is not None:
+            strongest_A = min(strongest_A, max(map(max, preset.current_map.largest_A)))
+        growth_s = self.onset_current_share * strongest_A / preset.limits.current_growth_A_per_s
+        return round(growth_s / preset.timing.sampling_period_s)
 
 
 @strict
@@ -86,6 +125,7 @@ class _Row:
     expect: Expectation
     start: str = "warm"
     realtime: bool = False
+    needs: tuple[Need, ...] = ()
     note: str = ""
 
 
@@ -108,6 +148,11 @@ class Row:
     start: Start
     realtime: bool
     note: str
+    needs: tuple[Need, ...] = ()
+
+    def follow(self, preset: Preset) -> Row:
+        """The row with its fault in the period that the start means for this preset."""
+        return replace(self, fault=replace(self.fault, from_period=self.start.onset(preset)))
 
     @property
     def latches(self) -> int | None:
@@ -152,7 +197,7 @@ def _expanded(
         )
     start = matrix.start[text.start]
     for content, label in _variants(text.fault, database):
-        fault = parse_fault({**content, "from_period": start.onset_period}, f"{where}: fault")
+        fault = parse_fault({**content, "from_period": start.onset_period or 0}, f"{where}: fault")
         check(fault, database, where)
         yield Row(
             name=f"{text.name}: {label}" if label else text.name,
@@ -161,6 +206,7 @@ def _expanded(
             start=start,
             realtime=text.realtime,
             note=text.note,
+            needs=text.needs,
         )
 
 

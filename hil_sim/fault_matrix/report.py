@@ -27,15 +27,28 @@ class MatrixResult:
 
     @property
     def red_first(self) -> list[Verdict]:
-        """All verdicts, those that did not go as expected before the others."""
-        return sorted(self.verdicts, key=lambda verdict: verdict.passed)
+        """All verdicts: what did not go as expected, what did, what does not apply."""
+        return sorted(self.verdicts, key=lambda v: (v.passed, v.does_not_apply is not None))
+
+    @property
+    def not_applied(self) -> dict[str, list[str]]:
+        """Names of the rows that do not apply, by the reason."""
+        found: dict[str, list[str]] = {}
+        for verdict in self.verdicts:
+            if verdict.does_not_apply is not None:
+                found.setdefault(verdict.does_not_apply, []).append(verdict.row.name)
+        return found
 
     @property
     def sentence(self) -> str:
         """In one sentence, whether all rows went as expected."""
         if self.red:
             return f"{len(self.red)} of {len(self.verdicts)} rows are red"
-        return f"all {len(self.verdicts)} rows as expected, no limit of the plant crossed"
+        left_out = sum(map(len, self.not_applied.values()))
+        applied = f"all {len(self.verdicts) - left_out} rows as expected"
+        if left_out:
+            applied += f", {left_out} do not apply"
+        return f"{applied}, no limit of the plant crossed"
 
 
 def expected_text(verdict: Verdict) -> str:
@@ -87,6 +100,7 @@ def _row_json(verdict: Verdict) -> dict[str, Any]:
         "max_voltage_V": verdict.max_voltage_V,
         "passed": verdict.passed,
         "failures": list(verdict.failures),
+        "does_not_apply": verdict.does_not_apply,
         "note": row.note,
     }
 
@@ -99,6 +113,7 @@ def matrix_junit(result: MatrixResult) -> str:
         tests=str(len(result.verdicts)),
         failures=str(len(result.red)),
         errors="0",
+        skipped=str(sum(map(len, result.not_applied.values()))),
         time=f"{result.wall_time_s:.3f}",
     )
     for verdict in result.verdicts:
@@ -112,6 +127,8 @@ def matrix_junit(result: MatrixResult) -> str:
         if not verdict.passed:
             failure = ElementTree.SubElement(case, "failure", message=verdict.failures[0])
             failure.text = "\n".join(verdict.failures)
+        elif verdict.does_not_apply is not None:
+            ElementTree.SubElement(case, "skipped", message=verdict.does_not_apply)
     suites = ElementTree.Element("testsuites")
     suites.append(suite)
     ElementTree.indent(suites)

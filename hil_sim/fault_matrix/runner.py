@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from bms.model.model_file import KanModel
 from bms.presets import Preset
@@ -37,30 +37,23 @@ class MatrixSettings:
 def play(settings: MatrixSettings, row: Row) -> Verdict:
     """Run one row and judge it. Raises InputError or BusError."""
     run = run_on_clocks if row.realtime else run_both
-    return judge(row, run(run_settings(settings, row)))
+    result = run(run_settings(settings, row))
+    return judge(row.follow(settings.preset), settings.preset, result)
 
 
 def run_settings(settings: MatrixSettings, row: Row) -> Settings:
     """The run of a row: a charge with one fault, until some time after it."""
-    start, initial = row.start, settings.preset.initial
-    initial = replace(
-        initial,
-        soc=initial.soc if start.soc is None else start.soc,
-        temperature_K=(
-            initial.temperature_K if start.temperature_K is None else start.temperature_K
-        ),
-    )
-    periods = start.onset_period + start.after_periods
+    periods = _periods(settings, row)
     return Settings(
         preset=settings.preset,
-        initial=initial,
+        initial=row.start.initial(settings.preset),
         model=settings.model,
         bus=settings.bus,
         seed=settings.seed,
         max_time_s=periods * settings.preset.timing.sampling_period_s,
         realtime=row.realtime,
         answer_timeout_s=_ANSWER_TIMEOUT_S[settings.is_virtual],
-        faults=(row.fault,),
+        faults=(row.follow(settings.preset).fault,),
         ends_early=False,
     )
 
@@ -77,7 +70,7 @@ def play_all(
     """
     with local_workforce(jobs if settings.is_virtual else 1) as workforce:
         # The long ones first, so that none is left over at the end.
-        order = sorted(rows, key=lambda row: (not row.realtime, -_periods(row)))
+        order = sorted(rows, key=lambda row: (not row.realtime, -_periods(settings, row)))
         futures = {row.name: workforce.executor.submit(play, settings, row) for row in order}
         for future in as_completed(futures.values()):
             future.result()
@@ -85,5 +78,5 @@ def play_all(
     return [futures[row.name].result() for row in rows]
 
 
-def _periods(row: Row) -> int:
-    return row.start.onset_period + row.start.after_periods
+def _periods(settings: MatrixSettings, row: Row) -> int:
+    return row.start.onset(settings.preset) + row.start.after_periods

@@ -7,7 +7,9 @@ import operator
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from bms.presets import Preset
 from hil_sim.fault_matrix.matrix import Reaction, Row, fault_numbers
+from hil_sim.fault_matrix.needs import unmet
 from hil_sim.run.result import RunResult
 
 
@@ -27,6 +29,8 @@ class Verdict:
     max_voltage_V: float
     wall_time_s: float
     failures: tuple[str, ...]
+    does_not_apply: str | None = None
+    """Why reaction and latch say nothing with this preset."""
 
     @property
     def passed(self) -> bool:
@@ -53,13 +57,17 @@ class _Seen:
         ]
 
 
-def judge(row: Row, result: RunResult) -> Verdict:
-    """Compare a run with what its row expects."""
+def judge(row: Row, preset: Preset, result: RunResult) -> Verdict:
+    """Compare a run with what its row, which follows the preset, expects."""
     seen, summary = _Seen(row, result), result.summary
+    reaction = [*_REACTIONS[row.expect.reaction](row, seen), *_latch_failures(row, seen)]
+    reason = None
+    if reaction and seen.before_A < 0.0:
+        onset = row.fault.window(result.series.period_s).start
+        reason = unmet(row.needs, preset, result, onset)
     failures = [
         *([] if seen.before_A < 0.0 else ["no current flowed before the fault"]),
-        *_REACTIONS[row.expect.reaction](row, seen),
-        *_latch_failures(row, seen),
+        *([] if reason else reaction),
         *(f"plant: {violation}" for violation in summary.violations),
     ]
     latched = functools.reduce(operator.or_, (bits or 0 for bits in seen.latched))
@@ -75,6 +83,7 @@ def judge(row: Row, result: RunResult) -> Verdict:
         max_voltage_V=summary.max_voltage_V,
         wall_time_s=summary.wall_time_s,
         failures=tuple(failures),
+        does_not_apply=reason,
     )
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
+from bms.text_table import TextTable, red
 from hil_sim.report.figures import figures
 from hil_sim.report.timing import timing_figures
 from hil_sim.run.result import RunResult
@@ -19,22 +18,19 @@ def print_table(
 ) -> None:
     """Figures of each run beside their limits, the verdict, and where the report lies."""
     preset, first = settings.preset, results[0].summary
-    title = escape(f"Charge of '{preset.name}' over {settings.bus}")
-    table = Table(title=title, title_justify="left")
-    table.add_column("")
-    for result in results:
-        table.add_column(result.summary.controller, justify="right")
-    table.add_column("limit", justify="right")
+    table = TextTable(
+        "",
+        *(result.summary.controller for result in results),
+        "limit",
+        title=f"Charge of '{preset.name}' over {settings.bus}",
+    )
     punctuality = timing_figures(results)
     for line in [*figures(preset.limits, results), *punctuality]:
         if punctuality and line is punctuality[0]:
             table.add_section()
-        cells = [
-            f"[red]{text}[/red]" if kept is False else text
-            for text, kept in zip(line.values, line.kept)
-        ]
+        cells = [red(text) if kept is False else text for text, kept in zip(line.values, line.kept)]
         table.add_row(line.name, *cells, line.limit)
-    console.print(table)
+    table.print(console)
     if first.passed:
         console.print(f"{first.controller}: every limit kept at every sub-step of the plant")
     else:

@@ -6,6 +6,7 @@ import multiprocessing
 import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
@@ -56,12 +57,21 @@ class WorkerPool(ProcessPoolExecutor):
 
 @contextmanager
 def local_workforce(jobs: int) -> Iterator[Workforce]:
-    """Processes on this machine; a single job runs in this one."""
+    """Processes on this machine; a single job runs in this one.
+
+    Raises InputError when the system ends one of them.
+    """
     if jobs == 1:
         yield Workforce(InlineExecutor(), 1)
         return
     with WorkerPool(jobs) as executor:
-        yield Workforce(executor, 2 * jobs)
+        try:
+            yield Workforce(executor, 2 * jobs)
+        except BrokenProcessPool:
+            raise InputError(
+                "a process of this command was ended by the system, perhaps for lack of memory; "
+                "lower --jobs"
+            ) from None
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from typing import get_args
 from xml.etree import ElementTree
@@ -20,6 +21,7 @@ from hil_sim.fault_matrix.runner import MatrixSettings, play, play_all
 from hil_sim.faults.frames import MessageFault
 from hil_sim.faults.plan import KINDS
 from hil_sim.faults.sensors import SensorName
+from hil_sim.run.workforce import local_workforce
 from tests.hil_sim.command_line import bms
 
 ROWS = load_matrix()
@@ -293,3 +295,15 @@ def test_wrong_use_is_one_line_and_exit_code_2(arguments, said, tmp_path):
     assert len(done.stderr.splitlines()) == 1
     assert said in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def end_of_the_system():
+    os._exit(9)
+
+
+def test_a_process_that_the_system_ends_is_one_line():
+    with (
+        pytest.raises(InputError, match="ended by the system, perhaps for lack of memory; lower"),
+        local_workforce(2) as workforce,
+    ):
+        workforce.executor.submit(end_of_the_system).result()

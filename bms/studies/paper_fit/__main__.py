@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from bms.errors import BmsError
 from bms.files import write_text
@@ -24,6 +22,7 @@ from bms.studies.paper_fit.fit import (
     rounded_preset,
 )
 from bms.studies.paper_fit.preset_text import with_values
+from bms.text_table import TextTable
 from bms.validation import read_text
 from bms.waiting import waiting
 
@@ -52,12 +51,11 @@ def run(
 
     Example: python -m bms.studies.paper_fit --seed 1 --out fitted.toml
     """
-    console = Console()
     fitted = load_preset(preset)
     if generations > 0:
         fitted = _search(fitted, error_bound_K, seed, generations)
-    console.print(_parameter_table(fitted))
-    console.print(_figure_table(fitted, error_bound_K))
+    _parameter_table(fitted).print()
+    _figure_table(fitted, error_bound_K).print()
     if out is not None:
         write_text(out, with_values(read_text(preset_path(preset)), _fitted_values(fitted)))
 
@@ -82,8 +80,8 @@ def _fitted_values(preset: Preset) -> dict[tuple[str, str], float]:
     return values
 
 
-def _parameter_table(preset: Preset) -> Table:
-    table = Table("parameter", "value", "range searched", "source of the range")
+def _parameter_table(preset: Preset) -> TextTable:
+    table = TextTable("parameter", "value", "range searched", "source of the range")
     values = {name: value for (_, name), value in _fitted_values(preset).items()}
     for parameter in FREE_PARAMETERS:
         table.add_row(
@@ -95,11 +93,11 @@ def _parameter_table(preset: Preset) -> Table:
     return table
 
 
-def _figure_table(preset: Preset, error_bound_K: float | None) -> Table:
+def _figure_table(preset: Preset, error_bound_K: float | None) -> TextTable:
     initial = preset.initial
     start = Start(initial.soc, initial.temperature_K, initial.cooling_power_W)
     charges = both_charges(preset, preset.cell, start, error_bound_K, FINAL_PERIOD_S)
-    table = Table("figure", "paper", "ours", "difference", "of tolerance")
+    table = TextTable("figure", "paper", "ours", "difference", "of tolerance")
     for figure, ours in zip(FIGURES, figures_of(*charges)):
         difference = float(ours) - figure.paper
         table.add_row(

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from bms.arrays import Array
-from bms.errors import InputError
+from bms.files import png, write_bytes
 from bms.studies.rivals.comparison import Comparison, Row
 
 _MARKERS = "osD^vP*Xh<>"
@@ -34,10 +34,7 @@ def save_chart(comparison: Comparison, path: Path) -> None:
     _label(cost, trace, comparison)
     figure.legend(*cost.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     figure.suptitle(comparison.title)
-    try:
-        figure.savefig(path, dpi=110, metadata={"Software": None})
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+    write_bytes(path, png(figure, 110))
 
 
 def _draw(

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from rich.box import SIMPLE
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
+from bms.text_table import TextTable, red
 from hil_sim.studies.bench.aims import aims
 from hil_sim.studies.bench.race import Absent, Timed
 from hil_sim.studies.bench.run import Result
@@ -37,34 +36,27 @@ def print_tables(console: Console, result: Result) -> None:
         if rows:
             if section != "perceptron":
                 c_ns = rows[0].time_ns.median if isinstance(rows[0], Timed) else None
-            console.print(_ways(title, rows, c_ns))
+            _ways(title, rows, c_ns).print(console)
     for speed in result.simulation:
         if speed.not_run:
             console.print(f"not run: {speed.bus}: {speed.not_run}", soft_wrap=True, markup=False)
     if any(speed.times_real_time for speed in result.simulation):
-        console.print(_simulation(result))
-        console.print(_layers(result))
+        _simulation(result).print(console)
+        _layers(result).print(console)
     if result.campaign:
-        console.print(_campaign(result))
+        _campaign(result).print(console)
     reached = list(aims(result))
     if reached:
-        console.print(_aims(result))
+        _aims(result).print(console)
 
 
-def _table(title: str, *headings: str) -> Table:
-    table = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0))
-    for number, heading in enumerate(headings):
-        table.add_column(heading, justify="right" if number else "left", no_wrap=True)
-    return table
-
-
-def _ways(title: str, rows: list[Timed | Absent], c_ns: float | None) -> Table:
-    table = _table(title, "", "median", "quartiles", "times C")
+def _ways(title: str, rows: list[Timed | Absent], c_ns: float | None) -> TextTable:
+    table = TextTable("", "median", "quartiles", "times C", title=title)
     for row in rows:
         if isinstance(row, Timed):
             quartiles = row.time_ns
             table.add_row(
-                escape(row.name),
+                row.name,
                 _time(quartiles.median),
                 f"{_time(quartiles.low)} .. {_time(quartiles.high)}",
                 "" if c_ns is None else _ratio(quartiles.median / c_ns),
@@ -99,9 +91,10 @@ def _time(time_ns: float) -> str:
     return f"{time_ns:.3g} ns"
 
 
-def _simulation(result: Result) -> Table:
+def _simulation(result: Result) -> TextTable:
     title = "Simulation of a charge in lock step, with protection and recording"
-    table = _table(title, "bus", "x real time", "quartiles", "processor", "periods", "parties")
+    headings = ("bus", "x real time", "quartiles", "processor", "periods", "parties")
+    table = TextTable(*headings, title=title)
     for speed in result.simulation:
         quartiles = speed.times_real_time
         if quartiles is not None:
@@ -116,11 +109,10 @@ def _simulation(result: Result) -> Table:
     return table
 
 
-def _layers(result: Result) -> Table:
+def _layers(result: Result) -> TextTable:
     speeds = [speed for speed in result.simulation if speed.layer_shares_percent]
-    table = _table(
-        "What the plant's process spends that time on, in %", "", *(s.bus for s in speeds)
-    )
+    title = "What the plant's process spends that time on, in %"
+    table = TextTable("", *(speed.bus for speed in speeds), title=title)
     names = dict.fromkeys(name for speed in speeds for name in speed.layer_shares_percent)
     for name in names:
         shares = [speed.layer_shares_percent.get(name, 0.0) for speed in speeds]
@@ -128,8 +120,8 @@ def _layers(result: Result) -> Table:
     return table
 
 
-def _campaign(result: Result) -> Table:
-    table = _table("Campaign, each run with three controllers", *_CAMPAIGN_HEADINGS)
+def _campaign(result: Result) -> TextTable:
+    table = TextTable(*_CAMPAIGN_HEADINGS, title="Campaign, each run with three controllers")
     for row, relative in zip(result.campaign, growth(result.campaign)):
         table.add_row(
             f"{row.runs}",
@@ -141,14 +133,14 @@ def _campaign(result: Result) -> Table:
     return table
 
 
-def _aims(result: Result) -> Table:
-    table = _table("Aims", "", "measured", "wanted", "")
+def _aims(result: Result) -> TextTable:
+    table = TextTable("", "measured", "wanted", "", title="Aims")
     for aim in aims(result):
         sign, unit = ("at most", " ns") if aim.unit == "ns" else ("at least", " x")
         table.add_row(
             aim.name,
             f"{aim.measured:,.0f}{unit}",
             f"{sign} {aim.wanted:,.0f}{unit}",
-            "reached" if aim.is_reached else "[red]missed[/red]",
+            "reached" if aim.is_reached else red("missed"),
         )
     return table
