@@ -17,8 +17,8 @@ from bms.files import make_folder, write_bytes, write_text
 from bms.presets import DEFAULT_PRESET, load_preset
 from bms.studies.optimum.answer import Case, cases
 from bms.studies.optimum.bound import SAMPLES
-from bms.studies.optimum.chart import chart
 from bms.studies.optimum.charge import Charge, charge_of
+from bms.studies.optimum.chart import chart
 from bms.studies.optimum.program import solver
 from bms.waiting import waiting
 
@@ -48,11 +48,9 @@ def optimum(
     ] = True,
     samples: Annotated[
         int,
-        typer.Option("--samples", min=20, max=2000, help="Samples of the current; more are closer."),
+        typer.Option("--samples", min=20, max=2000, help="Samples of the time; more are closer."),
     ] = SAMPLES,
-    out: Annotated[
-        Path | None, options.out_folder_option("optimum.json and optimum.png")
-    ] = None,
+    out: Annotated[Path | None, options.out_folder_option("optimum.json and optimum.png")] = None,
     as_json: options.JsonOption = False,
 ) -> None:
     """Tell the least time (s) in which any controller can fill the preset's nominal cell.

@@ -55,9 +55,7 @@ class _Adjoint:
 
 def _second_weight(relaxation: Relaxation, prices: Multipliers) -> Array:
     """Weight (N,) in V A/K of the core temperature in the reversible heat, by the second plane."""
-    weight: Array = (
-        relaxation.entropic_V_per_K * prices.core_share * relaxation.ranges.strongest_A
-    )
+    weight: Array = relaxation.entropic_V_per_K * prices.core_share * relaxation.ranges.strongest_A
     return weight
 
 
@@ -86,9 +84,7 @@ def _value(relaxation: Relaxation, prices: Multipliers, adjoint: _Adjoint) -> fl
     """Largest value of the Lagrangian in A s."""
     charge, ranges, heat = relaxation.charge, relaxation.ranges, adjoint.heat
     costs_heat = heat >= 0.0
-    ohm = np.where(
-        costs_heat, ranges.resistance_ohm[0][:, None], ranges.resistance_ohm[1][:, None]
-    )
+    ohm = np.where(costs_heat, ranges.resistance_ohm[0][:, None], ranges.resistance_ohm[1][:, None])
     linear = 1.0 + _charge_cost(relaxation, prices, adjoint.part_s)
     linear -= (ranges.resistance_ohm[0] * prices.voltage.sum(axis=1))[:, None]
     linear -= prices.current_map.sum(axis=1)[:, None]
@@ -103,12 +99,12 @@ def _value(relaxation: Relaxation, prices: Multipliers, adjoint: _Adjoint) -> fl
     peak = linear / np.maximum(2.0 * np.abs(heat) * ohm, 1e-300)
     current = np.clip(np.where(linear > 0.0, peak, 0.0), 0.0, strongest)
     at_most = linear * strongest - heat * ohm * strongest**2
-    best = np.where(
-        costs_heat, (linear - heat * ohm * current) * current, np.maximum(at_most, 0.0)
-    )
+    best = np.where(costs_heat, (linear - heat * ohm * current) * current, np.maximum(at_most, 0.0))
     second_K = relaxation.anchor_K[:, 1]
     offset_W = _second_weight(relaxation, prices) * (charge.start_K - second_K)
-    best = best - adjoint.temperatures @ charge.cooling - heat * offset_W[:, None] + heat * tangent_W
+    best = (
+        best - adjoint.temperatures @ charge.cooling - heat * offset_W[:, None] + heat * tangent_W
+    )
     return _simpson(best, adjoint.part_s) + _constant(relaxation, prices)
 
 

@@ -57,7 +57,9 @@ class _Program:
         branches = charge.cell.branches
         self._polarisation = cp.Variable((count + 1, len(branches))) if branches else None
         after = cp.cumsum(self._current) * (step_s / charge.cell.capacity_As)
-        self._soc = charge.start_soc + after - self._current * (0.5 * step_s / charge.cell.capacity_As)
+        self._soc = (
+            charge.start_soc + after - self._current * (0.5 * step_s / charge.cell.capacity_As)
+        )
         self._rules = [
             self._current <= ranges.strongest_A,
             self._rise[0] == 0.0,
@@ -72,7 +74,7 @@ class _Program:
         self._ramp = self._hold_ramp()
 
     def _next_rise(self) -> Any:
-        """Temperatures over the start at the ends of the samples, from those at their beginnings."""
+        """Temperatures over the start's at the ends of samples, from those at their beginnings."""
         charge, step_s = self._relaxation.charge, self._relaxation.ranges.step_s
         drive = np.zeros((5, 5))
         drive[:3, :3] = charge.dynamics
@@ -154,10 +156,13 @@ class _Program:
         try:
             problem.solve(solver=cp.CLARABEL)
         except cp.error.SolverError as error:
-            raise InputError(f"optimum: the solver failed at {ranges.duration_s:.1f} s: {error}") from None
+            raise InputError(
+                f"optimum: the solver failed at {ranges.duration_s:.1f} s: {error}"
+            ) from None
         if self._current.value is None:
             raise InputError(
-                f"optimum: no charge of {ranges.duration_s:.1f} s keeps the limits ({problem.status})"
+                f"optimum: the solver found no charge of {ranges.duration_s:.1f} s "
+                f"({problem.status})"
             )
         return Answer(
             charge_As=float(problem.value),
@@ -188,7 +193,8 @@ class _Program:
 
 
 def _dual(rule: Any) -> Array:
-    return np.maximum(np.asarray(rule.dual_value, dtype=float), 0.0)
+    price: Array = np.maximum(np.asarray(rule.dual_value, dtype=float), 0.0)
+    return price
 
 
 def _columns(rules: list[Any], count: int) -> Array:

@@ -18,8 +18,10 @@ from bms.cell import CellParameters
 from bms.presets.schema import CurrentMap
 from bms.studies.optimum.charge import Charge
 
-_ROUNDS = 3
+_ROUNDS = 5
 """The ranges need each other; every round leaves them valid, and later ones change little."""
+_PARTS = 4
+"""Steps of the state of charge in a sample."""
 
 
 @dataclass(frozen=True)
@@ -48,25 +50,21 @@ class Ranges:
 def ranges_of(charge: Charge, duration_s: float, samples: int) -> Ranges:
     """Ranges of every charge that is full after duration_s."""
     cell, step_s = charge.cell, duration_s / samples
-    end_s = step_s * np.arange(1, samples + 1)
-    strongest = np.full(samples, charge.strongest_A)
+    asked = np.full(samples, charge.strongest_A)
     if charge.growth_A_per_s is not None:
-        strongest = np.minimum(strongest, charge.growth_A_per_s * (end_s + charge.period_s))
-    core_K = surface_K = (
-        np.zeros(samples),
-        np.full(samples, charge.limits.max_core_temperature_K),
-    )
+        end_s = step_s * np.arange(1, samples + 1)
+        asked = np.minimum(asked, charge.growth_A_per_s * (end_s + charge.period_s))
+    limits_K = charge.limits.max_core_temperature_K, charge.limits.max_surface_temperature_K
+    core_K, surface_K = ((np.zeros(samples), np.full(samples, limit_K)) for limit_K in limits_K)
+    everything = np.zeros(samples), np.full(samples, charge.limits.max_soc)
+    resistance = _resistance(cell, core_K, everything)
     for _ in range(_ROUNDS):
-        soc = _soc(charge, strongest, step_s)
+        ceiling = Ceiling(charge, asked, surface_K[1], resistance[0])
+        soc = _soc(charge, ceiling, step_s)
+        strongest = np.array([ceiling(k, low) for k, low in enumerate(soc[0])])
         resistance = _resistance(cell, core_K, soc)
         entropic = _entropy(cell, soc)
-        core_K, surface_K = _temperatures(charge, strongest, resistance, entropic, core_K, step_s)
-        strongest = np.minimum(strongest, _by_voltage(charge, soc, resistance))
-        if charge.current_map is not None:
-            strongest = np.minimum(
-                strongest, map_current_A(charge.current_map, surface_K[1], soc[0])
-            )
-    soc = _soc(charge, strongest, step_s)
+        core_K, surface_K = _temperatures(charge, strongest, resistance, entropic, step_s)
     return Ranges(
         duration_s=duration_s,
         strongest_A=strongest,
@@ -74,18 +72,61 @@ def ranges_of(charge: Charge, duration_s: float, samples: int) -> Ranges:
         core_K=core_K,
         surface_K=surface_K,
         resistance_ohm=_resistance(cell, core_K, soc),
-        entropic_V_per_K=_entropy(cell, soc),
+        entropic_V_per_K=entropic,
     )
 
 
-def _soc(charge: Charge, strongest_A: Array, step_s: float) -> tuple[Array, Array]:
-    """From above by what was charged at most, from below by what can still be charged at most."""
-    parts = np.concatenate([[0.0], np.cumsum(strongest_A)]) * step_s / charge.cell.capacity_As
-    highest = np.minimum(charge.start_soc + parts[1:], charge.limits.max_soc)
-    left = parts[-1] - parts[:-1]
-    lowest = np.maximum(charge.limits.completion_soc - left, charge.start_soc)
-    # Where the duration is too short for any charge, the range is empty; keep it ordered.
-    return np.minimum(lowest, highest), highest
+class Ceiling:
+    """Strongest current in A in a sample over the state of charge, which it never rises with.
+
+    By what is asked for (N,), the voltage at the least resistance (N,), and the current map at the
+    hottest surface (N,).
+    """
+
+    def __init__(self, charge: Charge, asked_A: Array, hottest_K: Array, least_ohm: Array) -> None:
+        self.samples = len(asked_A)
+        self._asked_A, self._least_ohm = asked_A, least_ohm
+        self._most_V, self._ocv = charge.limits.max_voltage_V, charge.cell.ocv
+        self._map_soc: tuple[float, ...] = ()
+        if (table := charge.current_map) is not None:
+            self._map_soc = table.soc
+            columns = [
+                map_current_A(table, hottest_K, np.full(len(hottest_K), soc)) for soc in table.soc
+            ]
+            self._map_A = np.column_stack(columns)
+
+    def __call__(self, sample: int, soc: float) -> float:
+        """Strongest current in A of a sample at a state of charge."""
+        room_V = self._most_V - float(np.interp(soc, self._ocv.soc, self._ocv.voltage_V))
+        most_A = min(float(self._asked_A[sample]), room_V / float(self._least_ohm[sample]))
+        if self._map_soc:
+            most_A = min(most_A, float(np.interp(soc, self._map_soc, self._map_A[sample])))
+        return max(most_A, 0.0)
+
+
+def _soc(charge: Charge, ceiling: Ceiling, step_s: float) -> tuple[Array, Array]:
+    """From above by what can be charged until then, from below by what can be charged afterwards.
+
+    As the ceiling never rises with the state of charge, no charge that begins a part at s or below
+    ends it above s + part * ceiling(s). So the highest is followed forwards from the start; and
+    backwards from full, s is too low where s + part * ceiling(s) falls short.
+    """
+    samples = ceiling.samples
+    part = step_s / _PARTS / charge.cell.capacity_As
+    high, low = np.zeros(samples), np.zeros(samples)
+    soc = charge.start_soc
+    for k in range(samples):
+        for _ in range(_PARTS):
+            soc += part * ceiling(k, soc)
+        high[k] = min(soc, charge.limits.max_soc)
+    soc = charge.limits.completion_soc
+    for k in range(samples - 1, -1, -1):
+        for _ in range(_PARTS):
+            lowest = soc - part * ceiling(k, soc - part * charge.strongest_A)
+            soc -= part * ceiling(k, lowest)
+        low[k] = max(soc, charge.start_soc)
+    # Where the duration is too short for any charge, a range is empty; keep it ordered.
+    return np.minimum(low, high), high
 
 
 def _temperatures(
@@ -93,7 +134,6 @@ def _temperatures(
     strongest_A: Array,
     resistance: tuple[Array, Array],
     entropic: tuple[Array, Array],
-    core_K: tuple[Array, Array],
     step_s: float,
 ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
     """Core and surface between the coldest and the hottest charge; more heat never cools."""
@@ -105,38 +145,34 @@ def _temperatures(
     ohm = resistance[1] + sum(branch.resistance_ohm for branch in charge.cell.branches)
     strongest = np.maximum.accumulate(strongest_A)
     most_W = (ohm * strongest + most_V) * strongest
-    low = _course(charge, least_W, charge.cooling, step_s)
-    # Without cooling it only rises, so that its ends bound a sample.
-    high = _course(charge, most_W, np.zeros(3), step_s)
-    limits_K = (hottest_K, charge.limits.max_surface_temperature_K)
+    low, high = (_course(charge, heat_W, step_s) for heat_W in (least_W, most_W))
+    # Rates of the temperatures follow the dynamics too, whose rows add up to 0: none of them comes
+    # to exceed the largest at the beginning of a sample.
+    heats = most_W[:, None] * charge.heating + charge.cooling
+    fastest = np.max(high[:-1] @ charge.dynamics.T + heats, axis=1)
+    rise_K = np.maximum(fastest, 0.0) * step_s
     core, surface = (
         (
             np.minimum(low[:-1, i], low[1:, i]),
-            np.minimum(np.maximum(high[:-1, i], high[1:, i]), limit_K),
+            np.minimum(high[:-1, i] + rise_K, limit_K),
         )
-        for i, limit_K in enumerate(limits_K)
+        for i, limit_K in enumerate(
+            (hottest_K, charge.limits.max_surface_temperature_K),
+        )
     )
     return core, surface
 
 
-def _course(charge: Charge, heat_W: Array, cooling: Array, step_s: float) -> Array:
+def _course(charge: Charge, heat_W: Array, step_s: float) -> Array:
     """Temperatures (N + 1, 3) in K under a heat that is constant in each sample."""
     drive = np.zeros((5, 5))
     drive[:3, :3] = charge.dynamics
-    drive[:3, 3], drive[:3, 4] = charge.heating, cooling
+    drive[:3, 3], drive[:3, 4] = charge.heating, charge.cooling
     step = expm(drive * step_s)
     state = np.full((len(heat_W) + 1, 3), charge.start_K)
     for k, heat in enumerate(heat_W):
         state[k + 1] = step[:3, :3] @ state[k] + step[:3, 3] * heat + step[:3, 4]
     return state
-
-
-def _by_voltage(
-    charge: Charge, soc: tuple[Array, Array], resistance: tuple[Array, Array]
-) -> Array:
-    """Strongest current at the least open-circuit voltage, in A."""
-    room_V = charge.limits.max_voltage_V - charge.cell.ocv(soc[0])
-    return np.maximum(room_V, 0.0) / resistance[0]
 
 
 def _resistance(
@@ -180,10 +216,13 @@ def map_current_A(table: CurrentMap, temperature_K: Array, soc: Array) -> Array:
     below = np.clip(np.searchsorted(temperatures, at, side="right") - 1, 0, len(temperatures) - 2)
     share = (at - temperatures[below]) / (temperatures[below + 1] - temperatures[below])
     columns = np.arange(len(at))
-    return rows[below, columns] * (1.0 - share) + rows[below + 1, columns] * share
+    current_A: Array = rows[below, columns] * (1.0 - share) + rows[below + 1, columns] * share
+    return current_A
 
 
-def map_planes(table: CurrentMap, surface_K: tuple[float, float], soc: tuple[float, float]) -> Array:
+def map_planes(
+    table: CurrentMap, surface_K: tuple[float, float], soc: tuple[float, float]
+) -> Array:
     """Planes (P, 3) whose least value is never below the map in a range: I <= a + b Ts + c soc.
 
     They are the upper concave envelope. A bilinear piece has the envelope of its corners, so that

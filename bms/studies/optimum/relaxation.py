@@ -69,4 +69,6 @@ def relax(charge: Charge, duration_s: float, samples: int) -> Relaxation:
 def _stacked(rows: list[Array]) -> Array:
     """Arrays of different lengths in one, filled up by repetition of their last row."""
     longest = max(len(row) for row in rows)
-    return np.array([np.concatenate([row, np.repeat(row[-1:], longest - len(row), 0)]) for row in rows])
+    return np.array(
+        [np.concatenate([row, np.repeat(row[-1:], longest - len(row), 0)]) for row in rows]
+    )

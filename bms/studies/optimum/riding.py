@@ -144,4 +144,6 @@ def _allowed_A(
     later_V = polarisation_after_V(cell, polarisation_V, -current_A, step_s)
     room_V = limits.max_voltage_V - cell.ocv(fullest) - sum(later_V)
     later_ohm = ohmic_resistance_ohm(cell, core_K, fullest)
-    return np.maximum(np.minimum(current_A, room_V / np.maximum(later_ohm, ohm)), 0.0)
+    current_A = np.minimum(current_A, room_V / np.maximum(later_ohm, ohm))
+    allowed_A: Array = np.maximum(current_A, 0.0)
+    return allowed_A
