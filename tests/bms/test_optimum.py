@@ -11,10 +11,11 @@ import pytest
 from scipy.optimize import linprog
 from scipy.sparse import bmat, coo_matrix, csr_matrix, diags, hstack, identity, vstack
 
-from bms.cell import EntropyTable, ResistanceTable
+from bms.cell import Branch, EntropyTable, ResistanceTable
 from bms.errors import InputError
 from bms.presets import load_preset, preset_names
 from bms.presets.optimum import charge_digest, known_bound
+from bms.presets.schema import CurrentMap
 from bms.studies.optimum.bound import SAMPLES, lower_bound
 from bms.studies.optimum.certificate import most_charge_As
 from bms.studies.optimum.charge import charge_of
@@ -127,6 +128,50 @@ def test_the_quadrature_is_no_part_of_the_bound(hot):
     prices = solve(relaxation).multipliers
     rough, fine = (most_charge_As(relaxation, prices, points) for points in (8, 64))
     assert rough == pytest.approx(fine, rel=2e-6)
+
+
+def other_cells():
+    """Charges in which one part of a cell or preset governs, and how close the bound must be."""
+    charge = hot_charge().physics_alone()
+    cell, flat = charge.cell, (0.0, 1.0)
+    yield "branches", replace(cell, branches=(Branch(0.006, 15.0),)), None, 1.01
+    yield "heats by entropy", replace(cell, entropic_coefficient_V_per_K=2e-4), None, 1.01
+    rising = EntropyTable(flat, (-1e-4, 1e-4))
+    yield "entropy over SoC", replace(cell, entropy=rising), None, 1.03
+    falling = ResistanceTable((310.0, 325.0), flat, ((0.0124, 0.0124), (0.0110, 0.0110)))
+    yield "resistance over temperature", replace(cell, resistance=falling), None, 1.03
+    by_warmth = CurrentMap((310.0, 330.0), flat, ((6.0, 6.0), (26.0, 26.0)))
+    yield "map that warmth opens", cell, by_warmth, 1.05
+    by_charge = CurrentMap((300.0, 330.0), (0.5, 1.0), ((20.0, 4.0), (20.0, 4.0)))
+    yield "map that charge closes", cell, by_charge, 1.01
+
+
+@pytest.mark.parametrize(
+    ("cell", "current_map", "within"),
+    [pytest.param(*rest, id=name) for name, *rest in other_cells()],
+)
+def test_with_each_part_of_a_cell_the_bound_lies_closely_below_a_played_charge(
+    cell, current_map, within
+):
+    charge = replace(hot_charge().physics_alone(), cell=cell, current_map=current_map)
+    bound = lower_bound(charge, 60)
+    times_s = [best.time_s for best in (best_constant(charge), best_following(charge, bound))]
+    assert bound.time_s < min(times_s) < within * bound.time_s
+
+
+def test_the_fastest_charge_that_a_map_allows_is_on_the_edge_of_the_ranges():
+    current_map = CurrentMap((280.0, 330.0), (0.0, 1.0), ((22.0, 2.0), (22.0, 2.0)))
+    charge = replace(hot_charge().physics_alone(), start_K=290.0, current_map=current_map)
+    # At 22 - 20 s the state of charge is 1.1 - (1.1 - s0) exp(-20 t/C), from ds/dt = I/C.
+    per_s = 20.0 / charge.cell.capacity_As
+    duration_s = np.log((1.1 - charge.start_soc) / (1.1 - 0.99)) / per_s
+    ranges = ranges_of(charge, duration_s, 40)
+    ends_s = ranges.step_s * np.arange(41)
+    exact = 1.1 - (1.1 - charge.start_soc) * np.exp(-per_s * ends_s)
+    low, high = ranges.soc
+    assert np.all(low <= exact[:-1]) and np.all(exact[1:] <= high)
+    assert low == pytest.approx(exact[:-1], abs=0.01)
+    assert high == pytest.approx(exact[1:], abs=0.01)
 
 
 SHORT_S = 120.0
