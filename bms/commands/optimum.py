@@ -68,9 +68,7 @@ def optimum(
     if out is not None:
         make_folder(out)
     with waiting("optimum", 2.0 if ramp else 1.0, "bounds") as wait:
-        answers = cases(
-            charge, with_ramp=ramp, samples=samples, told=lambda doing: wait.reach(0.0, doing)
-        )
+        answers = cases(charge, with_ramp=ramp, samples=samples, told=wait.reach)
     text = json.dumps(_content(loaded.name, charge, answers), indent=1)
     title = (
         f"{loaded.name} from {charge.start_K:g} K, state of charge {charge.start_soc:g}, "
@@ -101,8 +99,8 @@ def _content(name: str, charge: Charge, answers: list[Case]) -> dict[str, Any]:
 def _print(title: str, answers: list[Case]) -> None:
     console = Console()
     table = Table(title=escape(title), title_justify="left")
-    for heading in ("bound", "no charge is full before", "finer samples", "constant, then riding",
-                    "fastest charge played"):  # fmt: skip
+    for heading in ("bound", "full at least after", "finer samples", "constant, then riding",
+                    "fastest played"):  # fmt: skip
         table.add_column(heading, justify="left" if heading == "bound" else "right")
     for case in answers:
         table.add_row(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -71,9 +72,10 @@ def cases(
     *,
     with_ramp: bool = True,
     samples: int = SAMPLES,
-    told: Callable[[str], None] = lambda doing: None,
+    told: Callable[[int, str], None] = lambda done, doing: None,
 ) -> list[Case]:
-    """Physics alone, and with the ramp and map of the charge; `told` hears what is done.
+    """Physics alone, and with the ramp and map of the charge; `told` hears how many are
+    complete, and what is done.
 
     Raises InputError as lower_bound does.
     """
@@ -81,7 +83,9 @@ def cases(
     if with_ramp:
         parts = "ramp" if charge.current_map is None else "ramp and current map"
         wanted.append((f"with {parts}", charge))
-    return [_case(name, one, samples, told) for name, one in wanted]
+    return [
+        _case(name, one, samples, partial(told, done)) for done, (name, one) in enumerate(wanted)
+    ]
 
 
 def _case(name: str, charge: Charge, samples: int, told: Callable[[str], None]) -> Case:

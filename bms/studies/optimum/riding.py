@@ -23,7 +23,7 @@ from bms.studies.optimum.ranges import map_current_A
 STEP_S = 0.2
 _APPROACH_PER_S = 1.0
 """Rate at which the core may come up to its limit."""
-_CANDIDATES = 16
+_CANDIDATES = 24
 _ROUNDING = 1e-6
 
 
