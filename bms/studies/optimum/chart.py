@@ -35,8 +35,8 @@ def chart(title: str, cases: list[Case]) -> bytes:
     for axes in (currents, temperatures, charges):
         axes.grid(True, color="#E4E4E4", lw=0.6)
         axes.spines[["top", "right"]].set_visible(False)
-    figure.legend(loc="outside upper center", ncols=len(cases), frameon=False)
-    figure.suptitle(title, fontsize=10)
+    currents.legend(loc="upper center", frameon=False)
+    currents.set_title(title, fontsize=10)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
     return buffer.getvalue()
