@@ -53,6 +53,8 @@ def figures(limits: Limits, results: list[RunResult]) -> list[Figure]:
     for name, key, pattern in free:
         values = [_text(getattr(summary, key), pattern) for summary in summaries]
         rows.append(Figure(name, values, "", [None] * len(values)))
+        if key == "charge_time_s":
+            rows += _bounds(summaries)
     potentials_V = [summary.min_anode_potential_V for summary in summaries]
     if any(potential_V is not None for potential_V in potentials_V):
         texts = [_text(potential_V, "{:.4f} V") for potential_V in potentials_V]
@@ -62,6 +64,21 @@ def figures(limits: Limits, results: list[RunResult]) -> list[Figure]:
         texts = [_text(None if loss is None else loss.total, "{}") for loss in losses]
         kept = [None if loss is None else loss.total == 0 for loss in losses]
         rows.append(Figure("Frames lost on the serial line", texts, "0", kept))
+    return rows
+
+
+def _bounds(summaries: list[Summary]) -> list[Figure]:
+    """How far each charge is from what no controller can beat; no row where nothing is known."""
+    rows = []
+    for name, bound, ratio in (
+        ("  over the bound of physics", "optimum_time_s", "time_over_optimum"),
+        ("  over the bound with ramp and map", "lower_bound_s", "time_over_bound"),
+    ):
+        bounds_s = [getattr(summary, bound) for summary in summaries]
+        known_s = next((bound_s for bound_s in bounds_s if bound_s is not None), None)
+        if known_s is not None:
+            texts = [_text(getattr(summary, ratio), "{:.3f}") for summary in summaries]
+            rows.append(Figure(name, texts, f"{known_s:.1f} s", [None] * len(texts)))
     return rows
 
 

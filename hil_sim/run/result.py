@@ -110,6 +110,13 @@ class Summary:
     plant: str = DEFAULT_PLANT
     min_anode_potential_V: float | None = None
     """Least over the run; None where the plant has no electrodes."""
+    optimum_time_s: float | None = None
+    """Time to full that no controller can beat, by physics alone; None where it is not known."""
+    time_over_optimum: float | None = None
+    """The charge's time over that."""
+    lower_bound_s: float | None = None
+    """The same with the preset's ramp and current map."""
+    time_over_bound: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain mapping in the order of the fields."""

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 
+from bms.presets.optimum import KnownBound, known_bound
 from hil_sim.bus.buses import is_serial_line
 from hil_sim.nodes.line_losses import LineLosses
 from hil_sim.nodes.punctuality import PlantWatch
+from hil_sim.plant.catalog import DEFAULT_PLANT
+from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.charge import Charge
 from hil_sim.run.result import (
     CHARGING_STATES,
@@ -38,6 +41,8 @@ def sum_up(
     estimates = is_firmware and not is_foreign
     errors_K = estimate_errors_K(series) if estimates else []
     violations = tuple(extremes.violations(limits))
+    charge_time_s = series.time_s[-1] if reason == STOP_COMPLETE else None
+    bound = bound_of(settings)
     summary = Summary(
         controller=FOREIGN_ECU if is_foreign else settings.controller.value,
         preset=settings.preset.name,
@@ -47,7 +52,7 @@ def sum_up(
         max_surface_temperature_K=extremes.surface_temperature_K,
         max_voltage_V=extremes.voltage_V,
         final_soc=charge.plant.state.soc,
-        charge_time_s=series.time_s[-1] if reason == STOP_COMPLETE else None,
+        charge_time_s=charge_time_s,
         first_derate_s=first_derate_s(series),
         kan_rmse_K=rmse_K(errors_K),
         kan_max_abs_error_K=max(map(abs, errors_K), default=None),
@@ -72,8 +77,31 @@ def sum_up(
         line_losses=losses if is_serial_line(settings.bus) else None,
         plant=settings.plant,
         min_anode_potential_V=extremes.min_anode_potential_V,
+        optimum_time_s=None if bound is None else bound.optimum_time_s,
+        time_over_optimum=None if bound is None else _over(charge_time_s, bound.optimum_time_s),
+        lower_bound_s=None if bound is None else bound.lower_bound_s,
+        time_over_bound=None if bound is None else _over(charge_time_s, bound.lower_bound_s),
     )
     return RunResult(summary, series, watch)
+
+
+def bound_of(settings: Settings) -> KnownBound | None:
+    """The bound on the time of this charge; None where its cell is not the nominal one throughout.
+
+    It speaks for the preset's own cell from its own start, without disturbance or fault.
+    """
+    is_nominal = (
+        settings.true_cell is None
+        and settings.plant == DEFAULT_PLANT
+        and settings.disturbance is DisturbanceKind.NONE
+        and not settings.faults
+        and settings.initial in (None, settings.preset.initial)
+    )
+    return known_bound(settings.preset) if is_nominal else None
+
+
+def _over(time_s: float | None, bound_s: float) -> float | None:
+    return None if time_s is None else round(time_s / bound_s, 4)
 
 
 def first_derate_s(series: TimeSeries) -> float | None:
