@@ -34,6 +34,7 @@ MAIN = "from bms.cli import main; main()"
 PATIENCE_S = 120.0
 BUS = "udp_multicast:239.74.163.89"
 
+EXTRAS = {"plating": "pybamm", "optimum": "cvxpy"}
 Started = subprocess.Popen[bytes]
 
 COMMANDS: dict[str, tuple[int, str]] = {
@@ -51,6 +52,7 @@ COMMANDS: dict[str, tuple[int, str]] = {
     "verify-tables": (0, "--stride 10000000 --processes 1"),
     "export": (0, "--preset lin2014 --out DIR/out"),
     "train": (0, "--data DIR/run.csv --lagged --out DIR/model.json"),
+    "optimum": (0, "--preset lin2014 --samples 20 --no-ramp --out DIR/out"),
     "evaluate": (0, "--model MODEL --data DIR/run.csv"),
     "explain": (0, "--model MODEL --data DIR/run.csv --out DIR/out"),
     "bound": (1, "--model MODEL --data DIR/run.csv --out DIR/out"),
@@ -192,8 +194,8 @@ def test_this_user_may_write_neither_home_nor_installation(user: list[str], fold
     ],
 )
 def test_command(name: str, user: list[str], folder: Path) -> None:
-    if name == "plating":
-        pytest.importorskip("pybamm", reason="not run: PyBaMM is not installed")
+    if name in EXTRAS:
+        pytest.importorskip(EXTRAS[name], reason=f"not run: {EXTRAS[name]} is not installed")
     code, text = COMMANDS[name]
     check(start(user, folder, name, *arguments(text, folder)), code)
 

@@ -8,9 +8,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from bms.commands import options
 from bms.files import make_folder, write_bytes, write_text
@@ -20,6 +17,7 @@ from bms.studies.optimum.bound import SAMPLES
 from bms.studies.optimum.charge import Charge, charge_of
 from bms.studies.optimum.chart import chart
 from bms.studies.optimum.program import solver
+from bms.text_table import TextTable
 from bms.waiting import waiting
 
 _ROWS = 12
@@ -97,11 +95,10 @@ def _content(name: str, charge: Charge, answers: list[Case]) -> dict[str, Any]:
 
 
 def _print(title: str, answers: list[Case]) -> None:
-    console = Console()
-    table = Table(title=escape(title), title_justify="left")
-    for heading in ("bound", "full at least after", "finer samples", "constant, then riding",
-                    "fastest played"):  # fmt: skip
-        table.add_column(heading, justify="left" if heading == "bound" else "right")
+    table = TextTable(
+        "bound", "full at least after", "finer samples", "constant, then riding", "fastest played",
+        title=title,
+    )  # fmt: skip
     for case in answers:
         table.add_row(
             case.name,
@@ -110,11 +107,10 @@ def _print(title: str, answers: list[Case]) -> None:
             _over(case, case.constant_s),
             _over(case, case.reached_s),
         )
-    console.print(table)
+    table.print()
     last = answers[-1]
-    profile = Table(title=f"current of the bound {last.name}", title_justify="left")
-    for heading in ("time s", "current A", "SoC", "core K", "surface K"):
-        profile.add_column(heading, justify="right")
+    headings = ("time s", "current A", "SoC", "core K", "surface K")
+    profile = TextTable(*headings, title=f"current of the bound {last.name}")
     bound = last.bound
     for k in np.unique(np.linspace(0, bound.samples - 1, _ROWS).round().astype(int)).tolist():
         core_K, surface_K, _ = bound.temperatures_K[k]
@@ -125,7 +121,7 @@ def _print(title: str, answers: list[Case]) -> None:
             f"{core_K:.2f}",
             f"{surface_K:.2f}",
         )
-    console.print(profile)
+    profile.print()
 
 
 def _over(case: Case, time_s: float | None) -> str:
