@@ -47,7 +47,8 @@ static float curved_A(float constant, float slope, float square)
     return (discriminant >= 0.0f) ? ((sqrtf(discriminant) - slope) / (2.0f * square)) : 0.0f;
 }
 
-/* What the conditions of one cell leave (rcbf.c). */
+/* What the conditions of one cell leave (rcbf.c), but for the error of the estimate in the reversible
+ * heat, a thousandth of it. */
 static float cell_limit_A(const planner_t *planner, const rcbf_constants_t *k, float step_s)
 {
     const float *above_K = planner->temperature_K;
@@ -66,14 +67,14 @@ static float cell_limit_A(const planner_t *planner, const rcbf_constants_t *k, f
         curved_A(k->a1_per_s * core_above_surface_K - k->alpha2_per_s * above_K[CORE] -
                    k->core_uncertainty_K_per_s - k->core_margin_K_per_s -
                    numeric_abs(k->a1_per_s - k->alpha2_per_s) * e_K,
-               k->a2_per_As * core_K + numeric_abs(k->a2_per_As) * e_K, k->a3_K_per_A2s);
+               k->a2_per_As * core_K, k->a3_K_per_A2s);
     const float surface_A =
         curved_A(k->a4_per_s2 * core_above_surface_K +
                    k->a6_per_s2 * (above_K[COOLANT] - above_K[SURFACE]) +
                    k->alpha3_per_s2 * surface_room_K +
                    k->a10_K_per_Ws2 * planner->start.cooling_power_W - k->delta4_K_per_s2 -
                    k->surface_margin_K_per_s2 - numeric_abs(k->a4_per_s2) * e_K,
-               k->a8_per_As2 * core_K + numeric_abs(k->a8_per_As2) * e_K, -k->a9_K_per_A2s2);
+               k->a8_per_As2 * core_K, -k->a9_K_per_A2s2);
     return weaker(soc_A, weaker(core_A, surface_A));
 }
 
