@@ -120,8 +120,8 @@ CORE_FOLDERS = _core("include", "src", "generated")
 CORE_HEADERS = tuple(
     f"firmware_c/include/{name}.h"
     for name in (
-        *("kan", "rcbf", "thermal", "soc", "family", "calibration", "can_frame", "e2e", "codec"),
-        *("monitor", "history", "network", "request", "bms"),
+        *("kan", "rcbf", "thermal", "soc", "family", "planner", "calibration", "can_frame"),
+        *("e2e", "codec", "monitor", "history", "network", "request", "bms"),
     )
 )
 FIRMWARE = NativeExtension(

@@ -73,8 +73,10 @@ def _direction(database: Database, message: Message) -> str:
     if message.senders != [ECU]:
         is_optional = number_attribute(database, message, OPTIONAL_ATTRIBUTE)
         return "plant to ECU, optional" if is_optional else "plant to ECU"
-    is_from_boot_stage = number_attribute(database, message, BOOT_STAGE_ATTRIBUTE)
-    return "ECU to plant, boot stage only" if is_from_boot_stage else "ECU to plant"
+    if number_attribute(database, message, BOOT_STAGE_ATTRIBUTE):
+        return "ECU to plant, boot stage only"
+    is_optional = number_attribute(database, message, OPTIONAL_ATTRIBUTE)
+    return "ECU to plant, where asked for" if is_optional else "ECU to plant"
 
 
 def _crc(firmware: Path) -> dict[str, str]:

@@ -15,6 +15,7 @@ import numpy as np
 from bms.barrier import barrier_constants, sampling_margins
 from bms.barrier.surface_prediction import surface_prediction
 from bms.calibration.family_block import family_fields
+from bms.calibration.planner_block import planner_fields
 from bms.calibration.plausibility import plausibility_fields
 from bms.errors import InputError
 from bms.model.model_file import KanModel
@@ -55,6 +56,7 @@ def calibration_fields(
         "plausibility": plausibility_fields(preset),
         "thermal": _thermal_fields(preset),
         "family": family_fields(preset),
+        "planner": planner_fields(preset),
         "kan": network_tables(model.network).fields(model.network, preset.timing.sampling_period_s),
     }
     for name, value in changes.items():

@@ -34,8 +34,8 @@ class MemoryMap:
 
 MEMORY_MAP = MemoryMap(
     boot=Region(0x0000, 6 * 1024),
-    application=Region(0x1800, 20 * 1024),
-    calibration=Region(0x6800, 6 * 1024),
+    application=Region(0x1800, 24 * 1024),
+    calibration=Region(0x7800, 6 * 1024),
     ram=Region(0x2000_0000, 8 * 1024),
 )
 

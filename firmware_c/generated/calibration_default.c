@@ -119,6 +119,18 @@ const bms_calibration_t BMS_DEFAULT_CALIBRATION = {
     .family = {
         .is_stated = 0u,
     },
+    .planner = {
+        .period_s = 0.100000001f,
+        .step_s = 5.0f,
+        .growth_A = 11.5f,
+        .completion_soc = 0.99000001f,
+        .response = {
+            0.946517706f, 0.0289313104f, 0.0245509502f, 0.204727396f,
+            -0.00253459602f, 0.68340379f, 0.0409129485f, 0.275683314f,
+            0.112689801f, -0.0518237315f, 0.0286414903f, 0.0136153297f,
+            0.957743227f, 0.00253459602f, -0.241421595f,
+        },
+    },
     .kan = {
         .layers = 2u,
         .cells = 2u,

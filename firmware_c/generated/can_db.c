@@ -1648,3 +1648,96 @@ bool can_db_boot_refusal_failed_check_is_in_phys_range(double value)
 {
     return ((value >= 0.0) && (value <= 255.0));
 }
+
+int can_db_plan_pack(
+    uint8_t *dst_p,
+    const struct can_db_plan_t *src_p,
+    size_t size)
+{
+    if (size < 6u) {
+        return (-EINVAL);
+    }
+
+    memset(&dst_p[0], 0, 6);
+
+    dst_p[0] |= pack_left_shift_u8(src_p->plan_crc, 0u, 0xffu);
+    dst_p[1] |= pack_left_shift_u8(src_p->plan_counter, 0u, 0x0fu);
+    dst_p[1] |= pack_left_shift_u32(src_p->planned_current, 4u, 0xf0u);
+    dst_p[2] |= pack_right_shift_u32(src_p->planned_current, 4u, 0xffu);
+    dst_p[3] |= pack_right_shift_u32(src_p->planned_current, 12u, 0xffu);
+    dst_p[4] |= pack_left_shift_u16(src_p->predicted_time_to_full, 0u, 0xffu);
+    dst_p[5] |= pack_right_shift_u16(src_p->predicted_time_to_full, 8u, 0xffu);
+
+    return (6);
+}
+
+int can_db_plan_unpack(
+    struct can_db_plan_t *dst_p,
+    const uint8_t *src_p,
+    size_t size)
+{
+    if (size < 6u) {
+        return (-EINVAL);
+    }
+
+    dst_p->plan_crc = unpack_right_shift_u8(src_p[0], 0u, 0xffu);
+    dst_p->plan_counter = unpack_right_shift_u8(src_p[1], 0u, 0x0fu);
+    dst_p->planned_current = unpack_right_shift_u32(src_p[1], 4u, 0xf0u);
+    dst_p->planned_current |= unpack_left_shift_u32(src_p[2], 4u, 0xffu);
+    dst_p->planned_current |= unpack_left_shift_u32(src_p[3], 12u, 0xffu);
+    dst_p->predicted_time_to_full = unpack_right_shift_u16(src_p[4], 0u, 0xffu);
+    dst_p->predicted_time_to_full |= unpack_left_shift_u16(src_p[5], 8u, 0xffu);
+
+    return (0);
+}
+
+int can_db_plan_init(struct can_db_plan_t *msg_p)
+{
+    if (msg_p == NULL) return -1;
+
+    memset(msg_p, 0, sizeof(struct can_db_plan_t));
+
+    return 0;
+}
+
+bool can_db_plan_plan_crc_is_in_range(uint8_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_plan_plan_crc_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 255.0));
+}
+
+bool can_db_plan_plan_counter_is_in_range(uint8_t value)
+{
+    return (value <= 15u);
+}
+
+bool can_db_plan_plan_counter_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 15.0));
+}
+
+bool can_db_plan_planned_current_is_in_range(uint32_t value)
+{
+    return (value <= 1048573u);
+}
+
+bool can_db_plan_planned_current_is_in_phys_range(double value)
+{
+    return ((value >= -1048.576) && (value <= 1048.57));
+}
+
+bool can_db_plan_predicted_time_to_full_is_in_range(uint16_t value)
+{
+    return (value <= 65533u);
+}
+
+bool can_db_plan_predicted_time_to_full_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 65533.0));
+}

@@ -60,6 +60,7 @@ extern "C" {
 #define CAN_DB_NETWORK_DIAGNOSTICS_FRAME_ID (0x186u)
 #define CAN_DB_DIAGNOSTICS2_FRAME_ID (0x187u)
 #define CAN_DB_BOOT_REFUSAL_FRAME_ID (0x188u)
+#define CAN_DB_PLAN_FRAME_ID (0x189u)
 
 /* Frame lengths in bytes. */
 #define CAN_DB_SYNC_LENGTH (0u)
@@ -77,6 +78,7 @@ extern "C" {
 #define CAN_DB_NETWORK_DIAGNOSTICS_LENGTH (8u)
 #define CAN_DB_DIAGNOSTICS2_LENGTH (7u)
 #define CAN_DB_BOOT_REFUSAL_LENGTH (4u)
+#define CAN_DB_PLAN_LENGTH (6u)
 
 /* Extended or standard frame types. */
 #define CAN_DB_SYNC_IS_EXTENDED (0)
@@ -94,6 +96,7 @@ extern "C" {
 #define CAN_DB_NETWORK_DIAGNOSTICS_IS_EXTENDED (0)
 #define CAN_DB_DIAGNOSTICS2_IS_EXTENDED (0)
 #define CAN_DB_BOOT_REFUSAL_IS_EXTENDED (0)
+#define CAN_DB_PLAN_IS_EXTENDED (0)
 
 /* Frame cycle times in milliseconds. */
 #define CAN_DB_SYNC_CYCLE_TIME_MS (100u)
@@ -111,6 +114,7 @@ extern "C" {
 #define CAN_DB_NETWORK_DIAGNOSTICS_CYCLE_TIME_MS (500u)
 #define CAN_DB_DIAGNOSTICS2_CYCLE_TIME_MS (500u)
 #define CAN_DB_BOOT_REFUSAL_CYCLE_TIME_MS (100u)
+#define CAN_DB_PLAN_CYCLE_TIME_MS (500u)
 
 /* Signal choices. */
 #define CAN_DB_CHARGE_REQUEST_REQUEST_OFF_CHOICE (0u)
@@ -218,6 +222,7 @@ extern "C" {
 #define CAN_DB_NETWORK_DIAGNOSTICS_NAME "NetworkDiagnostics"
 #define CAN_DB_DIAGNOSTICS2_NAME "Diagnostics2"
 #define CAN_DB_BOOT_REFUSAL_NAME "BootRefusal"
+#define CAN_DB_PLAN_NAME "Plan"
 
 /* Signal Names. */
 #define CAN_DB_CELL_ELECTRICAL_CELL_ELECTRICAL_CRC_NAME "CellElectricalCrc"
@@ -289,6 +294,10 @@ extern "C" {
 #define CAN_DB_BOOT_REFUSAL_BOOT_REFUSAL_COUNTER_NAME "BootRefusalCounter"
 #define CAN_DB_BOOT_REFUSAL_REFUSED_PART_NAME "RefusedPart"
 #define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_NAME "FailedCheck"
+#define CAN_DB_PLAN_PLAN_CRC_NAME "PlanCrc"
+#define CAN_DB_PLAN_PLAN_COUNTER_NAME "PlanCounter"
+#define CAN_DB_PLAN_PLANNED_CURRENT_NAME "PlannedCurrent"
+#define CAN_DB_PLAN_PREDICTED_TIME_TO_FULL_NAME "PredictedTimeToFull"
 
 /**
  * Signals in message SYNC.
@@ -455,7 +464,7 @@ struct can_db_charge_request_t {
 /**
  * Signals in message ChargeMode.
  *
- * How the charge is to be made; a charger that does not care leaves it out. What came last holds as long as the message is valid. Without it, and in mode Fastest, the charge is the fastest that the ECU has. Fixed follows the reference current. A mode that the ECU does not have is an invalid request, as ByTime is now.
+ * How the charge is to be made; a charger that does not care leaves it out. What came last holds as long as the message is valid. Without it, and in mode Fixed, the charge follows the reference current. Fastest and ByTime are planned: no more than the reference, with the constant current that fills the cell soonest, or with the least that fills it in TimeToFull. A mode that is not known, or ByTime without a time, is an invalid request.
  *
  * All signal values are as on the CAN bus.
  */
@@ -482,6 +491,8 @@ struct can_db_charge_mode_t {
     uint8_t mode;
 
     /**
+     * From now on, so that the sender counts it down; for ByTime only.
+     *
      * Range: 0..65533 (0..65533 s)
      * Scale: 1
      * Offset: 0
@@ -917,6 +928,43 @@ struct can_db_boot_refusal_t {
      * Offset: 0
      */
     uint8_t failed_check;
+};
+
+/**
+ * Signals in message Plan.
+ *
+ * Sent only while ChargeMode asks for a planned charge: the current that the ECU plans to ask for where no limit is nearer, and when it expects the cell to be full.
+ *
+ * All signal values are as on the CAN bus.
+ */
+struct can_db_plan_t {
+    /**
+     * Range: 0..255 (0..255 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t plan_crc;
+
+    /**
+     * Range: 0..15 (0..15 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t plan_counter;
+
+    /**
+     * Range: 0..1048573 (-1048.576..1048.57 A)
+     * Scale: 0.002
+     * Offset: -1048.576
+     */
+    uint32_t planned_current;
+
+    /**
+     * Range: 0..65533 (0..65533 s)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint16_t predicted_time_to_full;
 };
 
 /**
@@ -2991,6 +3039,131 @@ bool can_db_boot_refusal_failed_check_is_in_range(uint8_t value);
  * @return true if in range, false otherwise.
  */
 bool can_db_boot_refusal_failed_check_is_in_phys_range(double value);
+
+/**
+ * Pack message Plan.
+ *
+ * @param[out] dst_p Buffer to pack the message into.
+ * @param[in] src_p Data to pack.
+ * @param[in] size Size of dst_p.
+ *
+ * @return Size of packed data, or negative error code.
+ */
+int can_db_plan_pack(
+    uint8_t *dst_p,
+    const struct can_db_plan_t *src_p,
+    size_t size);
+
+/**
+ * Unpack message Plan.
+ *
+ * @param[out] dst_p Object to unpack the message into.
+ * @param[in] src_p Message to unpack.
+ * @param[in] size Size of src_p.
+ *
+ * @return zero(0) or negative error code.
+ */
+int can_db_plan_unpack(
+    struct can_db_plan_t *dst_p,
+    const uint8_t *src_p,
+    size_t size);
+
+/**
+ * Init message fields to default values from Plan.
+ *
+ * @param[in] msg_p Message to init.
+ *
+ * @return zero(0) on success or (-1) in case of nullptr argument.
+ */
+int can_db_plan_init(struct can_db_plan_t *msg_p);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_plan_plan_crc_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_plan_plan_crc_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_plan_plan_counter_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_plan_plan_counter_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_plan_planned_current_is_in_range(uint32_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_plan_planned_current_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_plan_predicted_time_to_full_is_in_range(uint16_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_plan_predicted_time_to_full_is_in_phys_range(double value);
 
 
 #ifdef __cplusplus

@@ -17,6 +17,7 @@
 #include "kan.h"
 #include "monitor.h"
 #include "network.h"
+#include "planner.h"
 #include "rcbf.h"
 #include "soc.h"
 #include "thermal.h"
@@ -26,7 +27,7 @@ extern "C" {
 #endif
 
 #define BMS_FIRMWARE_VERSION 3
-#define BMS_TRANSMITTED_MESSAGES 8
+#define BMS_TRANSMITTED_MESSAGES 9
 
 typedef enum {
     BMS_INIT = 0,
@@ -58,6 +59,7 @@ typedef struct {
     family_t family;
     monitor_t monitor;
     kan_estimate_t estimate;
+    planner_t planner;
     rcbf_decision_t decision;
     float command_A;
     uint8_t counters[BMS_TRANSMITTED_MESSAGES];

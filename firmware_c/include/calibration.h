@@ -7,6 +7,7 @@
 
 #include "family.h"
 #include "kan.h"
+#include "planner.h"
 #include "rcbf.h"
 #include "thermal.h"
 
@@ -49,6 +50,7 @@ typedef struct {
     plausibility_t plausibility;
     thermal_constants_t thermal;
     family_constants_t family;
+    planner_constants_t planner;
     kan_model_t kan;
 } bms_calibration_t;
 

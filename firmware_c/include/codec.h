@@ -63,17 +63,16 @@ typedef struct {
 /* What the application reports each period. */
 typedef struct {
     float command_A;
-    uint8_t state;
     float core_temperature_K;
     float soc;
     float error_bound_K;
     uint8_t in_domain;
     uint8_t active_constraint;
     uint8_t feasible;
+    uint8_t first_fault;
     float lower_A;
     float upper_A;
     float margins[4];
-    uint8_t first_fault;
     uint32_t active_faults;
     uint32_t latched_faults;
     uint8_t fault_page; /* codec_fault_page_t */
@@ -83,6 +82,9 @@ typedef struct {
     uint32_t model_hash;
     uint16_t preset_hash;
     uint8_t firmware_version;
+    uint8_t state;
+    float planned_A;                /* NaN without a plan, as is the next one */
+    float predicted_time_to_full_s;
 } codec_report_t;
 
 /* Reads received message `index` (order of CAN_RECEIVED); the length must have been checked. */

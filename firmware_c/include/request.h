@@ -11,7 +11,7 @@ extern "C" {
 #endif
 
 /* Whether a request is known and its numbers make a charge. The mode counts only where the optional
- * message asks for one; nothing here plans a charge by time, so that who asks for it is told. */
+ * message asks for one; a charge by time needs the time too. */
 bool request_is_valid(const codec_measurement_t *asked, bool has_mode, float max_soc);
 
 #ifdef __cplusplus

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stddef.h>
 
+#include "bms_plan.h"
 #include "bms_symptoms.h"
 #include "can_catalog.h"
 #include "numeric.h"
@@ -26,6 +27,7 @@ void bms_init(bms_t *bms, const bms_config_t *config)
     history_reset(&bms->history);
     family_reset(&bms->family);
     thermal_reset(&bms->thermal);
+    planner_reset(&bms->planner);
     if ((config != NULL) && (config->calibration != NULL) &&
         calibration_is_valid(config->calibration)) {
         bms->calibration = config->calibration;
@@ -135,11 +137,12 @@ static void follow_request(bms_t *bms, uint32_t symptoms)
     }
 }
 
-/* What is asked for, within the preset's strongest current and its growth in one period. The weaker
+/* What is asked for, no more than planned, within the preset's strongest current and its growth in one period. The weaker
  * of two charging currents is the greater number. */
 static float wanted_current_A(const bms_t *bms)
 {
-    const float asked_A = bms->measurement.reference_current_A;
+    const float asked_A =
+        planner_reference_A(&bms->planner, bms->measurement.reference_current_A);
     const float strongest_A = bms->calibration->reference_current_A;
     const float grown_A = bms->command_A - bms->calibration->current_growth_A;
     const float allowed_A = (grown_A < strongest_A) ? strongest_A : grown_A;
@@ -204,6 +207,7 @@ static void run_period(bms_t *bms)
         bms->state = BMS_STANDBY;
     }
     follow_request(bms, symptoms);
+    bms_plan(bms);
     decide(bms);
     /* A reading that is no number spoils the decision too, but has a name of its own. */
     symptoms |= bit_if(!monitor_stops(symptoms) && is_charging(bms) &&
@@ -252,11 +256,14 @@ static void queue_frames(bms_t *bms)
                                       ? (bms->calibration->preset_hash >> 16u)
                                       : 0u),
         .firmware_version = BMS_FIRMWARE_VERSION,
+        .planned_A = -bms->planner.planned_A,
+        .predicted_time_to_full_s = bms->planner.time_to_full_s,
     };
     bms->outbox_length = 0u;
     bms->outbox_next = 0u;
     for (uint32_t i = 0u; i < CAN_TRANSMITTED_COUNT; i++) {
-        if (bms->periods % CAN_TRANSMITTED[i].every_periods != 0u) {
+        const bool is_due = (bms->periods % CAN_TRANSMITTED[i].every_periods) == 0u;
+        if (!is_due || (CAN_TRANSMITTED[i].is_optional && !bms_has_planned_mode(bms))) {
             continue;
         }
         can_frame_t *frame = &bms->outbox[bms->outbox_length];

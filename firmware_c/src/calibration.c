@@ -45,6 +45,7 @@ bool calibration_is_valid(const bms_calibration_t *calibration)
            plausibility_is_valid(&calibration->plausibility) &&
            thermal_constants_are_valid(&calibration->thermal) &&
            family_constants_are_valid(&calibration->family) &&
+           planner_constants_are_valid(&calibration->planner) &&
            (calibration->kan.width[0] == KAN_MEASURED_INPUTS + calibration->kan.lags) &&
            kan_model_is_valid(&calibration->kan);
 }

@@ -192,6 +192,16 @@ static void write_identity(const codec_report_t *report, uint8_t *data)
     (void)can_db_identity_pack(data, &message, CAN_DB_IDENTITY_LENGTH);
 }
 
+static void write_plan(const codec_report_t *report, uint8_t *data)
+{
+    const struct can_db_plan_t message = {
+        .planned_current = encode_wide(CAN_SIGNAL_PLANNED_CURRENT, report->planned_A),
+        .predicted_time_to_full =
+            encode(CAN_SIGNAL_PREDICTED_TIME_TO_FULL, report->predicted_time_to_full_s),
+    };
+    (void)can_db_plan_pack(data, &message, CAN_DB_PLAN_LENGTH);
+}
+
 static void write_command(const codec_report_t *report, uint8_t *data)
 {
     const struct can_db_charge_command_t message = {
@@ -212,6 +222,7 @@ CODEC_APART void codec_write(uint32_t index, const codec_report_t *report, can_f
         [CAN_TRANSMITTED_NETWORK_DIAGNOSTICS] = write_network_diagnostics,
         [CAN_TRANSMITTED_DIAGNOSTICS2] = write_more_diagnostics,
         [CAN_TRANSMITTED_IDENTITY] = write_identity,
+        [CAN_TRANSMITTED_PLAN] = write_plan,
         [CAN_TRANSMITTED_CHARGE_COMMAND] = write_command,
     };
     frame->id = CAN_TRANSMITTED[index].id;

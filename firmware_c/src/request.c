@@ -1,8 +1,9 @@
 #include "request.h"
 
-static bool mode_is_known(uint8_t mode)
+static bool mode_is_known(const codec_measurement_t *asked)
 {
-    return (mode == MODE_FASTEST) || (mode == MODE_FIXED);
+    return (asked->mode == MODE_FASTEST) || (asked->mode == MODE_FIXED) ||
+           ((asked->mode == MODE_BY_TIME) && (asked->time_to_full_s >= 0.0f));
 }
 
 bool request_is_valid(const codec_measurement_t *asked, bool has_mode, float max_soc)
@@ -10,5 +11,5 @@ bool request_is_valid(const codec_measurement_t *asked, bool has_mode, float max
     const bool start_is_known = (asked->plug_in_soc >= 0.0f) && (asked->plug_in_soc <= max_soc);
     return (asked->request == REQUEST_OFF) ||
            ((asked->request == REQUEST_CHARGE) && (asked->reference_current_A <= 0.0f) &&
-            start_is_known && (!has_mode || mode_is_known(asked->mode)));
+            start_is_known && (!has_mode || mode_is_known(asked)));
 }

@@ -9,7 +9,7 @@ import typer
 
 from bms.commands.options import JsonOption, PresetOption
 from bms.presets import DEFAULT_PRESET, load_preset
-from hil_sim.commands import options
+from hil_sim.commands import charge_mode, options
 from hil_sim.commands.outcome import charge_and_report, charge_settings
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.session import run_plant
@@ -34,6 +34,8 @@ def plant(
             "--answer-timeout-s", min=0.01, help="Wait for the ECU in s before it counts as silent."
         ),
     ] = 1.0,
+    mode: charge_mode.ModeOption = None,
+    full_by_s: charge_mode.FullByOption = None,
 ) -> int:
     """Charge a simulated cell with whatever ECU is on the bus, for example `bms ecu`.
 
@@ -47,5 +49,6 @@ def plant(
     settings = charge_settings(
         load_preset(preset), bus, seed, disturbance, faults, max_time_s, realtime, cell
     )
+    settings = charge_mode.with_mode(settings, mode, full_by_s)
     settings = replace(settings, answer_timeout_s=answer_timeout_s)
     return charge_and_report(settings, run_plant, out, as_json, log=log)

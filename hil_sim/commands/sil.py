@@ -13,7 +13,7 @@ from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.bus.buses import is_serial_line
-from hil_sim.commands import options
+from hil_sim.commands import charge_mode, options
 from hil_sim.commands.outcome import charge_and_report, charge_settings
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.session import run_sil
@@ -50,6 +50,8 @@ def sil(
     as_json: JsonOption = False,
     realtime: options.RealtimeOption = False,
     max_time_s: options.MaxTimeOption = 3600.0,
+    mode: charge_mode.ModeOption = None,
+    full_by_s: charge_mode.FullByOption = None,
 ) -> int:
     """Charge a simulated cell over a CAN bus with the ECU in the same process.
 
@@ -87,6 +89,7 @@ def sil(
             controller=controller,
             model=expected,
         )
+        settings = charge_mode.with_mode(settings, mode, full_by_s)
         own_bus = Settings.bus if is_remote else bus
         second = None if baseline is None else replace(settings, controller=baseline, bus=own_bus)
         return charge_and_report(settings, run_sil, out, as_json, second, log)

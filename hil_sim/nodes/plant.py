@@ -27,6 +27,7 @@ _REPORTS = (
     Message.DIAGNOSTICS,
     Message.NETWORK_DIAGNOSTICS,
     Message.DIAGNOSTICS2,
+    Message.PLAN,
     Message.IDENTITY,
     Message.BOOT_REFUSAL,
 )
@@ -41,11 +42,17 @@ StampedFrame = tuple[float, Frame]
 
 @dataclass(frozen=True)
 class Request:
-    """What the charger asks for: on or off, the current wanted (A), state of charge at plug-in."""
+    """What the charger asks for: on or off, the current wanted (A), state of charge at plug-in.
+
+    Without a mode the charger leaves the message that asks for one out. The time in which to be
+    full (s, from now) is for ByTime alone.
+    """
 
     charge: bool
     reference_current_A: float
     plug_in_soc: float
+    mode: catalog.Mode | None = None
+    time_to_full_s: float | None = None
 
 
 class Answer:
@@ -112,6 +119,7 @@ class PlantNode:
         self._thermal = Sender(database[Message.CELL_THERMAL])
         self._coolant = Sender(database[Message.COOLANT])
         self._request = Sender(database[Message.CHARGE_REQUEST])
+        self._mode = Sender(database[Message.CHARGE_MODE])
         self._sync = Frame(database[Message.SYNC].frame_id, b"")
         self._receivers = {database[name].frame_id: Receiver(database[name]) for name in _REPORTS}
         self._identity = database[Message.IDENTITY]
@@ -243,6 +251,10 @@ class PlantNode:
                 }
             ),
         ]
+        if request.mode is not None:
+            frames.append(
+                self._mode.frame({"Mode": request.mode, "TimeToFull": request.time_to_full_s})
+            )
         return [*frames, self._sync] if self._turn.sync else frames
 
     def _answer(self, heard: list[Frame]) -> Answer:

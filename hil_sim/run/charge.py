@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from bms.errors import BusError, ModelMismatchError
 from bms.presets import Preset
-from hil_sim.bus.catalog import CommandState, FirstFault
+from hil_sim.bus.catalog import CommandState, FirstFault, Mode
 from hil_sim.bus.identity import Identity
 from hil_sim.bus.refusal import refusal_text
 from hil_sim.faults import Injection
@@ -55,6 +55,8 @@ class Charge:
     plug_in_soc: float | None = None
     """State of charge that the charger tells the ECU; None for the true one."""
     progress: Progress = lambda soc: None
+    mode: Mode | None = None
+    full_by_s: float | None = None
 
     def __post_init__(self) -> None:
         self.series = TimeSeries(self._period_s)
@@ -112,7 +114,15 @@ class Charge:
 
     def _request(self) -> Request:
         reference_A = self.preset.limits.reference_current_A
-        return Request(self._edge is not None, reference_A, self._plug_in_soc)
+        return Request(
+            self._edge is not None, reference_A, self._plug_in_soc, self.mode, self._time_left_s()
+        )
+
+    def _time_left_s(self) -> float | None:
+        """What is left of the time in which to be full; None where there is none to keep."""
+        if self.full_by_s is None:
+            return None
+        return max(0.0, self.full_by_s - (self._charge_period or 0) * self._period_s)
 
     def _prepare(self, answer: Answer) -> None:
         """Switch the request on once the ECU is ready, not before OFF_PERIODS."""

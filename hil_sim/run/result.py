@@ -43,6 +43,9 @@ class TimeSeries:
     active_constraint: list[str | None] = field(default_factory=list)
     feasible: list[bool | None] = field(default_factory=list)
     latched_faults: list[int | None] = field(default_factory=list)
+    planned_A: list[float | None] = field(default_factory=list)
+    predicted_time_to_full_s: list[float | None] = field(default_factory=list)
+    """These two only in the periods in which the ECU told them."""
 
     def append(
         self,
@@ -70,6 +73,8 @@ class TimeSeries:
         self.active_constraint.append(answer.active_constraint)
         self.feasible.append(answer.feasible)
         self.latched_faults.append(answer.latched_faults)
+        self.planned_A.append(answer.value("PlannedCurrent"))
+        self.predicted_time_to_full_s.append(answer.value("PredictedTimeToFull"))
 
 
 @dataclass(frozen=True)
@@ -117,6 +122,9 @@ class Summary:
     lower_bound_s: float | None = None
     """The same with the preset's ramp and current map."""
     time_over_bound: float | None = None
+    mode: str | None = None
+    """What the charger asked for; None where it left the message out."""
+    full_by_s: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain mapping in the order of the fields."""

@@ -179,6 +179,8 @@ def _run(
         model_hash=model.hash if is_firmware and isinstance(model, KanModel) else None,
         plug_in_soc=settings.true_cell.plug_in_soc if settings.true_cell else None,
         progress=progress,
+        mode=settings.mode if is_firmware else None,
+        full_by_s=settings.full_by_s,
     )
     start_s = time.perf_counter()
     reason = charge.run()

@@ -9,6 +9,7 @@ from pathlib import Path
 from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.presets.schema import Initial
+from hil_sim.bus.catalog import Mode
 from hil_sim.faults import Fault
 from hil_sim.plant.catalog import DEFAULT_PLANT
 from hil_sim.plant.disturbances import DisturbanceKind
@@ -45,6 +46,10 @@ class Settings:
     realtime: bool = False
     answer_timeout_s: float = ANSWER_TIMEOUT_S
     faults: tuple[Fault, ...] = ()
+    mode: Mode | None = None
+    """How to charge; None leaves the message out that asks for it."""
+    full_by_s: float | None = None
+    """When to be full, in s from the edge, for Mode.BY_TIME."""
     ends_early: bool = True
     initial: Initial | None = None
     """State of the cell at the start; that of the preset without."""

@@ -75,7 +75,8 @@ def test_optional_messages_and_those_of_the_boot_stage_are_told() -> None:
     directions = {row[1]: row[2] for row in table("# The CAN bus").values()}
     assert directions["[ChargeMode](#chargemode)"] == "plant to ECU, optional"
     assert directions["[BootRefusal](#bootrefusal)"] == "ECU to plant, boot stage only"
-    assert sum("," in direction for direction in directions.values()) == 2
+    assert directions["[Plan](#plan)"] == "ECU to plant, where asked for"
+    assert sum("," in direction for direction in directions.values()) == 3
 
 
 def test_a_crc_made_by_the_document_alone_is_that_of_the_example_and_of_cantools() -> None:

@@ -43,7 +43,7 @@ def load_control(out: Path, change: tuple[str, str] | None = None) -> tuple[FFI,
     shutil.copy(EXAMPLE / "control.h", out)
     modules = (
         *("calibration", "family_tables", "history", "kan", "monitor"),
-        *("rcbf", "soc", "thermal"),
+        *("planner", "rcbf", "soc", "thermal"),
     )
     sources = [EXAMPLE / "control.c", CORE / "generated" / "calibration_default.c"]
     sources += [CORE / "src" / f"{module}.c" for module in modules]

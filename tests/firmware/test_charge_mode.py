@@ -10,12 +10,15 @@ from tests.firmware.bench import DATABASE, HEALTHY, Bench, frame
 
 FASTEST, BY_TIME, FIXED, NOT_AVAILABLE = 0, 1, 2, 15
 REQUEST_INVALID, CORRUPTED_FRAMES = 9, 16
-NOT_HAD = [BY_TIME, *range(3, 15), NOT_AVAILABLE]
+UNKNOWN = 3
+NOT_HAD = [*range(UNKNOWN, 15), NOT_AVAILABLE]
+NO_TIME = 0xFFFF
+PLAN_EVERY = 5
 WINDOW_PERIODS = 5
 
 
 def bench_with(mode: int) -> Bench:
-    return Bench(values={**HEALTHY, "Mode": mode, "TimeToFull": 3600.0})
+    return Bench(values={**HEALTHY, "Mode": mode, "TimeToFull": 900.0})
 
 
 def active(bench: Bench) -> set[int]:
@@ -23,9 +26,8 @@ def active(bench: Bench) -> set[int]:
     return {n for n in range(20) if bits >> n & 1}
 
 
-@pytest.mark.parametrize("mode", [FASTEST, FIXED])
-def test_a_mode_that_the_ecu_has_charges_as_no_mode_does(mode: int) -> None:
-    with_mode, without = bench_with(mode), Bench()
+def test_the_fixed_mode_charges_as_no_mode_does() -> None:
+    with_mode, without = bench_with(FIXED), Bench()
     report = DATABASE.get_message_by_name("NetworkDiagnostics")
     of_the_network = {signal.name for signal in report.signals}
 
@@ -36,6 +38,34 @@ def test_a_mode_that_the_ecu_has_charges_as_no_mode_does(mode: int) -> None:
     for period in range(60):
         assert said(with_mode, period) == said(without, period)
     assert without.command_A < -5.0
+
+
+@pytest.mark.parametrize("mode", [FASTEST, BY_TIME])
+def test_a_planned_mode_charges_and_tells_its_plan(mode: int) -> None:
+    bench = bench_with(mode)
+    bench.start()
+    told = [bench.period() for _ in range(30 * PLAN_EVERY)]
+    plans = [answer for answer in told if "PlannedCurrent" in answer]
+    assert len(plans) == 30
+    assert (bench.state, active(bench)) == ("Charging", set())
+    assert -23.0 <= plans[-1]["PlannedCurrent"] < 0.0
+    assert 150.0 < plans[-1]["PredictedTimeToFull"] < 901.0
+
+
+@pytest.mark.parametrize("mode", [None, FIXED, UNKNOWN])
+def test_no_plan_is_told_to_who_has_not_asked_for_one(mode: int | None) -> None:
+    bench = Bench() if mode is None else bench_with(mode)
+    bench.start()
+    assert not any("PlannedCurrent" in bench.period() for _ in range(4 * PLAN_EVERY))
+
+
+def test_a_charge_by_time_needs_the_time() -> None:
+    bench = bench_with(BY_TIME)
+    bench.start()
+    for _ in range(3):
+        bench.period(TimeToFull=NO_TIME)
+        assert (bench.command_A, active(bench)) == (0.0, {REQUEST_INVALID})
+    assert (bench.state, bench.latched()) == ("Fault", {REQUEST_INVALID})
 
 
 @pytest.mark.parametrize("mode", NOT_HAD)
@@ -62,7 +92,7 @@ def test_in_a_charge_such_a_mode_stops_it_at_once_and_latches(mode: int) -> None
 
 @pytest.mark.parametrize("lost", [1, 2])
 def test_lost_frames_do_not_make_the_ecu_forget_what_was_asked_for(lost: int) -> None:
-    bench = bench_with(BY_TIME)
+    bench = bench_with(UNKNOWN)
     bench.get_ready()
     for _ in range(2):
         bench.period()
@@ -79,7 +109,7 @@ def test_a_message_that_goes_away_is_no_symptom_and_what_it_asked_for_ends() -> 
         assert (bench.state, active(bench)) == ("Charging", set())
         assert bench.command_A < 0.0
 
-    bench = bench_with(BY_TIME)
+    bench = bench_with(UNKNOWN)
     bench.get_ready()
     for _ in range(WINDOW_PERIODS):
         bench.period(drop=("ChargeMode",))
@@ -91,7 +121,7 @@ def test_a_message_that_begins_in_a_charge_counts_once_it_is_valid() -> None:
     bench = Bench()
     bench.start()
     for _ in range(2):
-        assert bench.period(Mode=BY_TIME)["CommandCurrent"] < 0.0
+        assert bench.period(Mode=UNKNOWN)["CommandCurrent"] < 0.0
     assert bench.period()["CommandCurrent"] == 0.0
     assert active(bench) == {REQUEST_INVALID}
 

@@ -29,7 +29,8 @@ pytestmark = needs_compiler
 
 SOURCES = [FIRMWARE / "image" / "image.c"]
 HEADERS = [
-    f"include/{name}.h" for name in ("kan", "soc", "rcbf", "family", "thermal", "calibration")
+    f"include/{name}.h"
+    for name in ("kan", "soc", "rcbf", "family", "planner", "thermal", "calibration")
 ]
 HEADERS.append("image/image.h")
 SAMPLE = 1500

@@ -34,6 +34,7 @@ DECISION, STATES = "tests/firmware/test_rcbf.py", "tests/firmware/test_ecu_state
 HISTORY, THERMAL = "tests/firmware/test_history.py", "tests/firmware/test_thermal.py"
 FAULTS, ESTIMATE = "tests/firmware/test_ecu_faults.py", "tests/firmware/test_kan.py"
 NETWORK, PROTECTION = "tests/firmware/test_supervision.py", "tests/firmware/test_e2e.py"
+PLANNED = "tests/firmware/test_planner.py"
 MARGINS = "names_the_constraint"
 
 MUTANTS = [
@@ -76,6 +77,16 @@ MUTANTS = [
     Mutant("the command is counted too", "soc.c", "? state->commanded.soc", "? state->measured.soc", STATES, "counted"),
     Mutant("a fault outlives its symptom", "monitor.c", "monitor->latched |= (uint32_t)1u << fault;", "monitor->latched = (uint32_t)1u << fault & monitor->active;", FAULTS, "whatever_other"),
     Mutant("commands are rounded towards zero", "codec.c", "(rounding == CODEC_TOWARDS_ZERO) ? STEP_TOLERANCE : 0.5f", "0.5f", "tests/firmware/test_codec.py", "towards_zero"),
+    Mutant("a plan only weakens", "planner.c", "((planned_A > reference_A) && (planned_A <= 0.0f))", "(planned_A <= 0.0f)", PLANNED, "never_more"),
+    Mutant("a plan asks for no discharge", "planner.c", " && (planned_A <= 0.0f))", ")", PLANNED, "never_more"),
+    Mutant("a plan needs numbers", "planner.c", "if (!is_known(&planner->start, &planner->goal))", "if (planner->goal.strongest_A < 0.0f)", PLANNED, "no_number"),
+    Mutant("a period's steps are bounded", "planner.c", " && (i < PLANNER_STEPS); i++", "; i++", PLANNED, "takes_no_more"),
+    Mutant("the better half is searched on", "planner.c", "inner[0].cost < inner[1].cost", "inner[0].cost > inner[1].cost", PLANNED, "near_the_bound"),
+    Mutant("limits are ridden in the prediction", "planner.c", "weaker(soc_A, weaker(core_A, surface_A))", "soc_A", PLANNED, "comes_true"),
+    Mutant("the coolant warms up", "planner.c", "row[COOLANT] * planner->temperature_K[COOLANT] +", "row[COOLANT] * planner->start.temperature_K[COOLANT] +", PLANNED, "comes_true or near_the_bound"),
+    Mutant("in time is better than soon", "planner.c", "(candidate->strength_A + IN_TIME)", "(IN_TIME - candidate->strength_A)", PLANNED, "by_time"),
+    Mutant("the fixed mode is not planned", "bms_plan.c", "((mode == MODE_FASTEST) || (mode == MODE_BY_TIME))", "(mode <= MODE_FIXED)", "tests/firmware/test_charge_mode.py", "fixed"),
+    Mutant("a mode that is gone is not obeyed", "bms_plan.c", "is_valid(bms, CAN_RECEIVED_CHARGE_MODE) &&", "", PLANNED, "goes_away"),
 ]  # fmt: skip
 
 

@@ -181,3 +181,34 @@ def test_the_ecu_starts_without_loading_plots_or_solvers():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
     assert not {"matplotlib", "scipy", "cantools", "jinja2"} & set(loaded)
+
+
+def test_a_mode_is_asked_for_and_stands_in_the_summary(tmp_path):
+    done = bms("sil", "--preset", nearly_full(tmp_path), "--json", "--mode", "fastest")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (json.loads(done.stdout)["mode"], json.loads(done.stdout)["full_by_s"]) == (
+        "fastest",
+        None,
+    )
+    done = bms("sil", "--max-time-s", 2, "--json", "--mode", "by-time", "--full-by-s", 900)
+    summary = json.loads(done.stdout)
+    assert (summary["mode"], summary["full_by_s"]) == ("by-time", 900.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (("--mode", "by-time"), "bms: --mode by-time: needs the time; add --full-by-s"),
+        (
+            ("--full-by-s", 900, "--mode", "fastest"),
+            "bms: --full-by-s 900: only mode by-time keeps a time; add --mode by-time",
+        ),
+        (
+            ("--mode", "fastest", "--controller", "s-cbf"),
+            "bms: --mode fastest: s-cbf has no modes; leave it out, or choose kan-rcbf",
+        ),
+    ],
+)
+def test_a_mode_that_cannot_be_is_told_in_one_line(options, line):
+    done = bms("sil", *options)
+    assert (done.returncode, done.stdout, done.stderr.splitlines()) == (2, "", [line])

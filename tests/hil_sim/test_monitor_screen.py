@@ -19,7 +19,7 @@ from hil_sim.monitor.status_line import status_line
 from tests.hil_sim.golden.record import FOLDER
 from tests.hil_sim.monitor_picture import PICTURE, drawn, picture, snapshot_of
 
-SELDOM = ("ChargeMode", "BootRefusal")  # neither is sent in a charge of today's plant
+SELDOM = ("ChargeMode", "Plan", "BootRefusal")  # none is sent in a charge of today's plant
 SIZES = [(80, 24), (120, 40), (200, 24), (80, 60)]
 
 

@@ -1,0 +1,56 @@
+#include "bms_plan.h"
+
+#include "bms_symptoms.h"
+
+/* As soon as possible. */
+#define NO_TIME_LEFT_S (-1.0f)
+
+bool bms_has_planned_mode(const bms_t *bms)
+{
+    const uint8_t mode = bms->measurement.mode;
+    return is_valid(bms, CAN_RECEIVED_CHARGE_MODE) &&
+           ((mode == MODE_FASTEST) || (mode == MODE_BY_TIME));
+}
+
+static void describe(const bms_t *bms, planner_start_t *start, planner_goal_t *goal)
+{
+    const codec_measurement_t *m = &bms->measurement;
+    const bms_calibration_t *calibration = bms->calibration;
+    const family_t *family = &bms->family;
+    const float core_K = bms->estimate.core_temperature_K;
+    const float limit_K = calibration->rcbf.max_core_temperature_K.high_K;
+    start->temperature_K[0] = core_K - limit_K;
+    start->temperature_K[1] = bms->surface_temperature_K - limit_K;
+    start->temperature_K[2] = m->coolant_temperature_K - limit_K;
+    start->soc = bms->soc.soc;
+    start->strength_A = -bms->command_A - 0.5f * calibration->planner.growth_A;
+    start->cooling_power_W = m->cooling_power_W;
+    start->resistance_ohm = calibration->thermal.ohmic_resistance_ohm;
+    start->entropic_V = calibration->thermal.entropic_coefficient_V_per_K * core_K;
+    if (has_family(bms)) {
+        /* Of the cell at hand no more is known than the hottest core and the greatest heat. */
+        const float most_A = family->strength_A + calibration->family.current_error_A;
+        start->temperature_K[0] = -family->core_room_K;
+        start->entropic_V = family->entropic_V;
+        start->resistance_ohm = (family->heat_W / most_A - family->entropic_V) / most_A;
+    }
+    goal->strongest_A = -m->reference_current_A;
+    if (goal->strongest_A > -calibration->reference_current_A) {
+        goal->strongest_A = -calibration->reference_current_A;
+    }
+    goal->time_left_s = (m->mode == MODE_BY_TIME) ? m->time_to_full_s : NO_TIME_LEFT_S;
+}
+
+void bms_plan(bms_t *bms)
+{
+    const bms_calibration_t *calibration = bms->calibration;
+    if (!is_charging(bms) || !bms_has_planned_mode(bms)) {
+        planner_reset(&bms->planner);
+        return;
+    }
+    if (planner_is_due(&bms->planner)) {
+        describe(bms, &bms->planner.start, &bms->planner.goal);
+        planner_begin(&bms->planner);
+    }
+    planner_step(&bms->planner, &calibration->planner, &calibration->rcbf, &calibration->family);
+}
