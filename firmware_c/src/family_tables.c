@@ -28,20 +28,31 @@ float family_resistance_ohm(const family_constants_t *constants, float temperatu
     return ohm[0] + share * (ohm[1] - ohm[0]);
 }
 
-static uint32_t cell_of(float soc)
+uint32_t family_soc_cell(float soc)
 {
     return (uint32_t)numeric_clamp(soc * (float)FAMILY_SOC_CELLS, 0.0f,
                                    (float)(FAMILY_SOC_CELLS - 1));
 }
 
-float family_greatest(const float *cells, float soc_low, float soc_high)
+float family_greatest(const float *cells, uint32_t first, uint32_t end)
 {
-    const uint32_t last = cell_of(soc_high);
-    float greatest = cells[last];
-    for (uint32_t i = cell_of(soc_low); i < last; i++) {
-        greatest = larger(greatest, cells[i]);
+    const float *last = &cells[end - 1u];
+    float greatest = *last;
+    for (const float *cell = &cells[first]; cell < last; cell++) {
+        greatest = larger(greatest, *cell);
     }
     return greatest;
+}
+
+float family_rise_V_per_s(const family_t *family, const family_constants_t *constants,
+                          float strength_A)
+{
+    float rise_V_per_s = 0.0f;
+    for (uint32_t i = 0u; i < constants->branches; i++) {
+        rise_V_per_s += constants->branch[i].drift_ohm_per_s *
+                        larger(0.0f, strength_A - family->weak_A[i]);
+    }
+    return rise_V_per_s;
 }
 
 static uint32_t below(const float *axis, uint32_t points, float at)
