@@ -126,7 +126,8 @@ typedef struct {
     soc_counter_t soc_high;
     bool soc_known;
     uint8_t first_cell; /* of the grid's cells that the state of charge may be in */
-    uint8_t end_cell;   /* past the last of them */
+    uint8_t end_cell;   /* past the last of them; 0 where it is not known */
+    uint8_t ocv_segment; /* of the table, where the last search ended */
     uint32_t bridged;             /* periods without usable readings, in a row */
     float strength_A; /* at the last reading */
     float strong_A[FAMILY_MAX_BRANCHES]; /* what flows in each branch's resistance, at most */
@@ -141,6 +142,8 @@ typedef struct {
     float entropic_V;      /* dU/dT times temperature, at most */
     float ocv_slope_V;     /* at most */
     float entropic_V_per_K; /* at most */
+    float unknown_ocv_slope_V; /* both where the state of charge is not known */
+    float unknown_entropic_V_per_K;
     float resistance_ohm; /* at most, at the last reading */
     float heat_W;          /* at most, in the last period */
     float surface_temperature_K;

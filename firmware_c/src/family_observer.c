@@ -31,8 +31,8 @@ static float greatest_of(const float *cells, float greatest, uint32_t was_first,
     return is_known ? larger(greatest, cells[end - 1u]) : family_greatest(cells, first, end);
 }
 
-static void look_up_cells(family_t *family, const family_constants_t *constants, float soc_low,
-                          float soc_high)
+NUMERIC_INLINE void look_up_cells(family_t *family, const family_constants_t *constants,
+                                  float soc_low, float soc_high)
 {
     const uint32_t first = family_soc_cell(soc_low);
     const uint32_t end = family_soc_cell(soc_high) + 1u;
@@ -49,10 +49,9 @@ static void look_up_cells(family_t *family, const family_constants_t *constants,
     }
 }
 
-static void forget_core(family_t *family, const family_constants_t *constants)
+static void forget_core(family_t *family)
 {
     family->soc_known = false;
-    look_up_cells(family, constants, 0.0f, 1.0f);
     family->core_is_known = false;
     family->core_room_K = 0.0f;
     family->rest.count = 0u;
@@ -64,7 +63,7 @@ static void forget_core(family_t *family, const family_constants_t *constants)
 /* A load heats and polarises the cell in ways that nobody follows here. */
 static void forget_after_load(family_t *family, const family_constants_t *constants)
 {
-    forget_core(family, constants);
+    forget_core(family);
     family->rest_polarisation_V = constants->rest_polarisation_V;
     /* What a load has left goes down as what was there at plug-in. */
     for (uint32_t i = 0u; i < FAMILY_MAX_BRANCHES; i++) {
@@ -74,8 +73,12 @@ static void forget_after_load(family_t *family, const family_constants_t *consta
 
 void family_reset(family_t *family, const family_constants_t *constants)
 {
-    *family = (family_t){ .soc_known = false };
-    forget_core(family, constants);
+    *family = (family_t){
+        .unknown_ocv_slope_V = family_greatest(constants->ocv_slope_V, 0u, FAMILY_SOC_CELLS),
+        .unknown_entropic_V_per_K =
+            family_greatest(constants->entropic_V_per_K, 0u, FAMILY_SOC_CELLS),
+    };
+    forget_core(family);
 }
 
 /* Greatest or least state of charge whose open-circuit voltage may be this one. */
@@ -196,13 +199,18 @@ NUMERIC_INLINE void look_up(family_t *family, const family_constants_t *constant
         low = family->soc_low.soc;
         look_up_cells(family, constants, low,
                       family->soc_high.soc + constants->hold_soc_per_A * family->strongest_A);
+    } else {
+        family->ocv_slope_V = family->unknown_ocv_slope_V;
+        family->entropic_V_per_K = family->unknown_entropic_V_per_K;
+        family->end_cell = 0u;
     }
     family->entropic_V =
         family->entropic_V_per_K *
         ((family->entropic_V_per_K > 0.0f) ? cell->max_core_temperature_K.high_K
                                            : constants->coldest_core_K);
     family->overpotential_V =
-        larger(0.0f, reading->voltage_V - rcbf_open_circuit_voltage_V(cell, low) +
+        larger(0.0f, reading->voltage_V -
+                         rcbf_open_circuit_voltage_near_V(cell, low, &family->ocv_segment) +
                          constants->ocv_error_V + constants->voltage_error_V +
                          2.0f * family->rest_polarisation_V);
 }

@@ -123,9 +123,10 @@ float kan_edge_value(const kan_model_t *model, uint32_t edge, float x, bool *in_
  * input are 0. */
 NUMERIC_INLINE bool is_in_slabs(const kan_model_t *model, const float *normalised)
 {
-    const kan_direction_t *end = &model->direction[model->directions];
+    const kan_direction_t *direction = model->direction;
+    const kan_direction_t *end = &direction[model->directions];
     const bool is_wide = model->width[0] > BLOCK;
-    for (const kan_direction_t *direction = model->direction; direction < end; direction++) {
+    for (; direction < end; direction++) {
         const float *c = direction->component;
         float along = c[0] * normalised[0];
         along += c[1] * normalised[1];

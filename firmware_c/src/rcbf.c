@@ -256,17 +256,36 @@ rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t
     return decision;
 }
 
-float rcbf_open_circuit_voltage_V(const rcbf_constants_t *constants, float soc)
+NUMERIC_INLINE float ocv_V(const rcbf_constants_t *constants, uint32_t segment, float soc)
 {
-    const uint32_t last = constants->ocv_points - 1u;
-    const float clamped =
-        numeric_clamp(soc, constants->ocv_soc[0], constants->ocv_soc[last]);
-    const uint32_t segment =
-        numeric_segment(constants->ocv_soc, constants->ocv_points, clamped);
     const float *at = &constants->ocv_soc[segment];
     const float *at_V = &constants->ocv_V[segment];
     const float slope_V = (at_V[1] - at_V[0]) / (at[1] - at[0]);
-    return at_V[0] + slope_V * (clamped - at[0]);
+    return at_V[0] + slope_V * (soc - at[0]);
+}
+
+NUMERIC_INLINE float within_table(const rcbf_constants_t *constants, float soc)
+{
+    return numeric_clamp(soc, constants->ocv_soc[0],
+                         constants->ocv_soc[constants->ocv_points - 1u]);
+}
+
+float rcbf_open_circuit_voltage_V(const rcbf_constants_t *constants, float soc)
+{
+    const float clamped = within_table(constants, soc);
+    return ocv_V(constants,
+                 numeric_segment(constants->ocv_soc, constants->ocv_points, clamped), clamped);
+}
+
+float rcbf_open_circuit_voltage_near_V(const rcbf_constants_t *constants, float soc,
+                                       uint8_t *segment)
+{
+    const float clamped = within_table(constants, soc);
+    const float *start = &constants->ocv_soc[*segment];
+    if (!((clamped > start[0]) && (clamped <= start[1]))) {
+        *segment = (uint8_t)numeric_segment(constants->ocv_soc, constants->ocv_points, clamped);
+    }
+    return ocv_V(constants, *segment, clamped);
 }
 
 bool rcbf_constants_are_valid(const rcbf_constants_t *k)

@@ -61,6 +61,29 @@ def test_the_greatest_of_a_table_is_that_of_all_cells_that_are_touched(
     assert greatest(code, getattr(code.k, name), low, high) == cells[first : last + 1].max()
 
 
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.0, 1.0), st.lists(st.tuples(st.floats(-400.0, 5.0), st.integers(1, 30))))
+def test_a_charge_keeps_the_greatest_of_what_its_bounds_span(
+    code: FamilyCode, told_soc: float, parts: list[tuple[float, int]]
+) -> None:
+    family, reading = code.observer(), code.reading()
+    code.observe(family, reading)
+    code.begin(family, told_soc, reading)
+    for current_A, periods in [*parts, (-200.0, 60)]:
+        for _ in range(periods):
+            code.observe(family, code.reading(current_A=current_A, command_A=current_A))
+            if not family.soc_known:
+                return
+            rise = np.float32(code.k.hold_soc_per_A) * np.float32(family.strongest_A)
+            high = np.float32(family.soc_high.soc) + rise
+            for name in TABLES:
+                cells = np.array(list(getattr(code.k, name)))
+                first, last = (
+                    min(int(at * len(cells)), len(cells) - 1) for at in (family.soc_low.soc, high)
+                )
+                assert getattr(family, name) == cells[first : last + 1].max()
+
+
 @settings(max_examples=100, deadline=None)
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_slope_and_entropy_of_a_table_are_nowhere_more(

@@ -44,6 +44,7 @@ MUTANTS = [
     Mutant("temperatures are finer than float32", "rcbf.c", " + (a.low_K - b.low_K)", "", DECISION, "slsqp or osqp"),
     Mutant("voltage limit decides", "rcbf.c", "k->max_voltage_V - rcbf_open_circuit", "k->max_voltage_V + rcbf_open_circuit", DECISION, MARGINS),
     Mutant("an empty interval gives 0 A", "rcbf.c", "decision.feasible ? interval.lower_A : 0.0f", "interval.lower_A", DECISION, "infeasible"),
+    Mutant("a constraint that may decide is solved", "rcbf.c", "#define CLEARLY 1e-5f", "#define CLEARLY -1e-2f", DECISION, "just_decides"),
     Mutant("not a number is refused", "rcbf.c", "if (!is_physical(input))", "if (input->reference_current_A > 0.0f)", DECISION, "no_number"),
     Mutant("extrapolation is flagged", "kan.c", "in_domain = false;", "in_domain = true;", ESTIMATE, "flagged"),
     Mutant("combinations never seen are flagged", "kan.c", "!is_in_slabs(model, nodes)", "false", ESTIMATE, "combination"),
