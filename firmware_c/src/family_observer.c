@@ -18,37 +18,6 @@ NUMERIC_INLINE float smaller(float a, float b)
     return (a < b) ? a : b;
 }
 
-/* Greatest value of the cells from first to before end; `greatest` is that of those from was_first
- * to before was_end, which mostly tells it. */
-static float greatest_of(const float *cells, float greatest, uint32_t was_first, uint32_t was_end,
-                         uint32_t first, uint32_t end)
-{
-    bool is_known = (first >= was_first) && (first < was_end) && (end >= was_end) &&
-                    (end - was_end <= 1u);
-    for (uint32_t i = was_first; is_known && (i < first); i++) {
-        is_known = cells[i] < greatest;
-    }
-    return is_known ? larger(greatest, cells[end - 1u]) : family_greatest(cells, first, end);
-}
-
-NUMERIC_INLINE void look_up_cells(family_t *family, const family_constants_t *constants,
-                                  float soc_low, float soc_high)
-{
-    const uint32_t first = family_soc_cell(soc_low);
-    const uint32_t end = family_soc_cell(soc_high) + 1u;
-    const uint32_t was_first = family->first_cell;
-    const uint32_t was_end = family->end_cell;
-    if ((first != was_first) || (end != was_end)) {
-        family->ocv_slope_V = greatest_of(constants->ocv_slope_V, family->ocv_slope_V, was_first,
-                                          was_end, first, end);
-        family->entropic_V_per_K = greatest_of(constants->entropic_V_per_K,
-                                               family->entropic_V_per_K, was_first, was_end,
-                                               first, end);
-        family->first_cell = (uint8_t)first;
-        family->end_cell = (uint8_t)end;
-    }
-}
-
 static void forget_core(family_t *family)
 {
     family->soc_known = false;
@@ -197,8 +166,9 @@ NUMERIC_INLINE void look_up(family_t *family, const family_constants_t *constant
     float low = 0.0f;
     if (family->soc_known) {
         low = family->soc_low.soc;
-        look_up_cells(family, constants, low,
-                      family->soc_high.soc + constants->hold_soc_per_A * family->strongest_A);
+        family_look_up_cells(
+            family, constants, low,
+            family->soc_high.soc + constants->hold_soc_per_A * family->strongest_A);
     } else {
         family->ocv_slope_V = family->unknown_ocv_slope_V;
         family->entropic_V_per_K = family->unknown_entropic_V_per_K;

@@ -13,6 +13,10 @@ uint32_t family_soc_cell(float soc);
 /* Greatest value of any cell of the grid from the first to the one before the end. */
 float family_greatest(const float *cells, uint32_t first, uint32_t end);
 
+/* Greatest slope and entropic coefficient between two states of charge, into the family. */
+void family_look_up_cells(family_t *family, const family_constants_t *constants, float soc_low,
+                          float soc_high);
+
 /* Rise of the branches' voltages at a strength that holds on, at most. */
 float family_rise_V_per_s(const family_t *family, const family_constants_t *constants,
                           float strength_A);

@@ -1,7 +1,6 @@
 #include "rcbf.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "numeric.h"
 
@@ -200,9 +199,11 @@ NUMERIC_INLINE void narrow_by_both(interval_t *to, const robust_t *f, rcbf_activ
 /* Numbers from 0 up compare as their bits do, and NaN comes after all of them. */
 NUMERIC_INLINE uint32_t bits_of(float value)
 {
-    uint32_t bits;
-    (void)memcpy(&bits, &value, sizeof bits);
-    return bits;
+    const union {
+        float value;
+        uint32_t bits;
+    } both = { value };
+    return both.bits;
 }
 
 /* Whether the magnitude is, for a largest one from 0 up; the sign is shifted out. */
