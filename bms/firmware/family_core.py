@@ -22,7 +22,7 @@ class FamilyCore:
         self._family, self._cell = ffi.addressof(block.family), ffi.addressof(block.rcbf)
         self._block = block
         self.state = ffi.new("family_t *")
-        lib.family_reset(self.state)
+        lib.family_reset(self.state, self._family)
 
     def observe(self, reading: Any) -> None:
         """Take the readings of a period."""

@@ -125,6 +125,9 @@ typedef struct {
     soc_counter_t soc_low;
     soc_counter_t soc_high;
     bool soc_known;
+    uint8_t first_cell; /* of the grid's cells that the state of charge may be in */
+    uint8_t end_cell;   /* past the last of them; 0 where it is not known */
+    uint8_t ocv_segment; /* of the table, where the last search ended */
     uint32_t bridged;             /* periods without usable readings, in a row */
     float strength_A; /* at the last reading */
     float strong_A[FAMILY_MAX_BRANCHES]; /* what flows in each branch's resistance, at most */
@@ -138,6 +141,10 @@ typedef struct {
     float overpotential_V; /* at most */
     float entropic_V;      /* dU/dT times temperature, at most */
     float ocv_slope_V;     /* at most */
+    float entropic_V_per_K; /* at most */
+    float unknown_ocv_slope_V; /* both where the state of charge is not known */
+    float unknown_entropic_V_per_K;
+    float resistance_ohm; /* at most, at the last reading */
     float heat_W;          /* at most, in the last period */
     float surface_temperature_K;
     bool core_is_known;
@@ -150,7 +157,7 @@ typedef struct {
 bool family_constants_are_valid(const family_constants_t *constants);
 
 /* Nothing is known of the cell. */
-void family_reset(family_t *family);
+void family_reset(family_t *family, const family_constants_t *constants);
 
 /* A charge begins at this state of charge, more or less; the voltage of a cell at rest tells it too.
  */
@@ -158,7 +165,7 @@ void family_begin(family_t *family, const family_constants_t *constants,
                   const rcbf_constants_t *cell, float plug_in_soc,
                   const family_reading_t *reading);
 
-/* Takes the readings of one period. */
+/* Takes the readings of one period. What follows is asked with the same readings. */
 void family_observe(family_t *family, const family_constants_t *constants,
                     const rcbf_constants_t *cell, const family_reading_t *reading);
 

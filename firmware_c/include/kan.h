@@ -65,7 +65,8 @@ typedef struct {
     bool in_domain;
 } kan_estimate_t;
 
-/* True when sizes fit the maxima, all numbers are finite and all knots rise. */
+/* True when sizes fit the maxima, all numbers are finite, all knots rise, and those of the first
+ * layer span what inputs reach. */
 bool kan_model_is_valid(const kan_model_t *model);
 
 /* Edge function number `edge` at x, which is clamped to its knots; beyond them (or for NaN) clears

@@ -93,6 +93,11 @@ bool rcbf_constants_are_valid(const rcbf_constants_t *constants);
 /* Open-circuit voltage in V, linear between table points, constant beyond them. */
 float rcbf_open_circuit_voltage_V(const rcbf_constants_t *constants, float soc);
 
+/* The same, for states of charge that change little from call to call: `segment` is where the last
+ * search ended, at first 0. */
+float rcbf_open_circuit_voltage_near_V(const rcbf_constants_t *constants, float soc,
+                                       uint8_t *segment);
+
 /* Charging current. 0 A with feasible == false when no current satisfies all constraints
  * (RCBF_INFEASIBLE) or an input is not finite, out of any physical range, or the reference is
  * above 0 A (RCBF_INVALID). */

@@ -25,12 +25,14 @@ void bms_init(bms_t *bms, const bms_config_t *config)
     *bms = (bms_t){ .state = BMS_INIT, .estimate = { NAN, false }, .decision = NO_DECISION };
     monitor_reset(&bms->monitor);
     history_reset(&bms->history);
-    family_reset(&bms->family);
     thermal_reset(&bms->thermal);
     planner_reset(&bms->planner);
     if ((config != NULL) && (config->calibration != NULL) &&
         calibration_is_valid(config->calibration)) {
         bms->calibration = config->calibration;
+        if (has_family(bms)) {
+            family_reset(&bms->family, &bms->calibration->family);
+        }
     }
 }
 

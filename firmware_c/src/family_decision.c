@@ -5,41 +5,39 @@
 #include "family_tables.h"
 #include "numeric.h"
 
-static float larger(float a, float b)
+NUMERIC_INLINE float larger(float a, float b)
 {
     return (a > b) ? a : b;
 }
 
-static float smaller(float a, float b)
+NUMERIC_INLINE float smaller(float a, float b)
 {
     return (a < b) ? a : b;
 }
 
 /* Strongest current that can flow until the end of the hold. */
-static float strongest_in_hold_A(const family_t *family, const family_constants_t *constants,
-                                 float measured_A, float wanted_A)
+NUMERIC_INLINE float strongest_in_hold_A(const family_t *family,
+                                         const family_constants_t *constants, float measured_A,
+                                         float wanted_A)
 {
     const float commanded_A = larger(wanted_A, family->supply_high_A);
     return larger(measured_A, commanded_A * (1.0f + constants->supply_tolerance));
 }
 
 /* Rise of the voltage at a held current within the hold: charge, and branches that fill up. */
-static float drift_V(const family_t *family, const family_constants_t *constants, float strength_A)
+NUMERIC_INLINE float drift_V(const family_t *family, const family_constants_t *constants,
+                             float strength_A)
 {
-    float per_s = 0.0f;
-    for (uint32_t i = 0u; i < constants->branches; i++) {
-        per_s += constants->branch[i].drift_ohm_per_s *
-                 larger(0.0f, strength_A - family->weak_A[i]);
-    }
     return constants->hold_s *
-               (per_s + constants->rest_drift_per_s * family->rest_polarisation_V) +
+               (family_rise_V_per_s(family, constants, strength_A) +
+                constants->rest_drift_per_s * family->rest_polarisation_V) +
            family->ocv_slope_V * constants->hold_soc_per_A * strength_A;
 }
 
 /* How much more than asked for the charger gives, at most: by tolerance, or as far as the measured
  * current shows it. */
-static float supply_factor(const family_t *family, const family_constants_t *constants,
-                           float measured_A)
+NUMERIC_INLINE float supply_factor(const family_t *family, const family_constants_t *constants,
+                                   float measured_A)
 {
     const float most = 1.0f + constants->supply_tolerance;
     const float least = 1.0f - constants->supply_tolerance;
@@ -49,8 +47,8 @@ static float supply_factor(const family_t *family, const family_constants_t *con
     return larger(least, measured_A / family->supply_low_A);
 }
 
-static float voltage_strength_A(const family_constants_t *constants, const family_heat_t *heat,
-                                float measured_A, float room_V)
+NUMERIC_INLINE float voltage_strength_A(const family_constants_t *constants,
+                                        const family_heat_t *heat, float measured_A, float room_V)
 {
     const float sure_V = room_V - constants->current_error_A * heat->resistance_ohm;
     return measured_A + sure_V / ((sure_V >= 0.0f) ? heat->resistance_ohm
@@ -65,9 +63,10 @@ typedef struct {
 } core_condition_t;
 
 /* Outflow at the hottest core that is possible, and what its distance from the limit adds. */
-static core_condition_t core_condition(const family_t *family, const family_constants_t *constants,
-                                       const rcbf_constants_t *cell,
-                                       const family_reading_t *reading)
+NUMERIC_INLINE core_condition_t core_condition(const family_t *family,
+                                               const family_constants_t *constants,
+                                               const rcbf_constants_t *cell,
+                                               const family_reading_t *reading)
 {
     const float limit_K = cell->max_core_temperature_K.high_K;
     const float low_K = cell->max_core_temperature_K.low_K;
@@ -84,7 +83,7 @@ static core_condition_t core_condition(const family_t *family, const family_cons
     };
 }
 
-static float left_W(const core_condition_t *core, float heat_W, float strength_A)
+NUMERIC_INLINE float left_W(const core_condition_t *core, float heat_W, float strength_A)
 {
     return core->outflow_W - heat_W -
            strength_A * (core->slope_W_per_A + strength_A * core->square_ohm);
@@ -99,7 +98,7 @@ static float core_left_W(const core_condition_t *core, const family_heat_t *heat
                   strength_A);
 }
 
-static float core_strength_A(const core_condition_t *core, const family_heat_t *heat)
+NUMERIC_INLINE float core_strength_A(const core_condition_t *core, const family_heat_t *heat)
 {
     return larger(family_measured_strength_A(heat, core->square_ohm, core->slope_W_per_A,
                                              core->outflow_W),
@@ -107,19 +106,23 @@ static float core_strength_A(const core_condition_t *core, const family_heat_t *
                                             core->outflow_W));
 }
 
+/* 0 A in place of what is none, or no number. */
+NUMERIC_INLINE float allowed(float strength_A)
+{
+    return (strength_A >= 0.0f) ? strength_A : 0.0f;
+}
+
 rcbf_decision_t family_decide(const family_t *family, const family_constants_t *constants,
                               const rcbf_constants_t *cell, const family_reading_t *reading,
                               float reference_current_A)
 {
-    rcbf_decision_t decision = { 0.0f, false, RCBF_INVALID, 0.0f, 0.0f, { 0.0f } };
     if (!reading->is_usable || !numeric_is_finite(reading->current_A) ||
         !(reference_current_A <= 0.0f) || !(reference_current_A >= -FLT_MAX)) {
-        return decision;
+        return (rcbf_decision_t){ .active = RCBF_INVALID };
     }
     const float measured_A = larger(-reading->current_A, 0.0f);
-    const float factor = supply_factor(family, constants,
-                                       measured_A + constants->current_error_A);
-    family_heat_t heat = family_heat(family, constants, reading);
+    family_heat_t heat = family_heat(family, constants, measured_A);
+    const float factor = supply_factor(family, constants, heat.at_most_A);
     const float held_A =
         strongest_in_hold_A(family, constants, heat.at_most_A, -reference_current_A);
     const float drifting_V = drift_V(family, constants, held_A);
@@ -128,22 +131,22 @@ rcbf_decision_t family_decide(const family_t *family, const family_constants_t *
     heat.overpotential_V += drifting_V;
 
     float strength_A = -reference_current_A * factor;
-    decision.active = RCBF_NONE;
+    rcbf_active_t active = RCBF_NONE;
     const float mapped_A = family_mapped_A(
         &constants->map, reading->surface_temperature_K - constants->surface_error_K,
         family->soc_high.soc);
     if (!(strength_A <= mapped_A)) {
         strength_A = mapped_A;
-        decision.active = RCBF_MAP;
+        active = RCBF_MAP;
     }
     const float voltage_A = voltage_strength_A(constants, &heat, measured_A, room_V);
     if (!(strength_A <= voltage_A)) {
         strength_A = voltage_A;
-        decision.active = RCBF_VOLTAGE;
+        active = RCBF_VOLTAGE;
     }
     if (!family->core_is_known) {
         strength_A = -1.0f;
-        decision.active = RCBF_CORE_UNKNOWN;
+        active = RCBF_CORE_UNKNOWN;
     }
     const core_condition_t core = core_condition(family, constants, cell, reading);
     const float coolant_room_K =
@@ -153,22 +156,26 @@ rcbf_decision_t family_decide(const family_t *family, const family_constants_t *
         /* A core that may be too hot waits, though it would cool down with a little current too;
          * beside a coolant that is too hot it would not. */
         strength_A = -1.0f;
-        decision.active = RCBF_CORE;
+        active = RCBF_CORE;
     }
-    if ((strength_A >= 0.0f) && !(core_left_W(&core, &heat, strength_A) >= 0.0f)) {
+    float allowed_A = allowed(strength_A);
+    float left_at_W = core_left_W(&core, &heat, allowed_A);
+    if ((strength_A >= 0.0f) && !(left_at_W >= 0.0f)) {
         const float core_A = core_strength_A(&core, &heat);
         if (!(strength_A <= core_A)) {
             strength_A = core_A;
-            decision.active = RCBF_CORE;
+            active = RCBF_CORE;
+            allowed_A = allowed(strength_A);
+            left_at_W = core_left_W(&core, &heat, allowed_A);
         }
     }
-    decision.feasible = (strength_A >= 0.0f) && (strength_A <= FLT_MAX);
-    const float allowed_A = decision.feasible ? strength_A : 0.0f;
-    decision.current_A = -allowed_A / factor;
-    decision.lower_A = decision.current_A;
-    decision.margins[0] = room_V - heat.resistance_ohm * (allowed_A - measured_A);
-    decision.margins[1] = NAN;
-    decision.margins[2] = constants->core_K_per_J * core_left_W(&core, &heat, allowed_A);
-    decision.margins[3] = NAN;
-    return decision;
+    const float current_A = -allowed_A / factor;
+    return (rcbf_decision_t){
+        .current_A = current_A,
+        .feasible = strength_A >= 0.0f,
+        .active = active,
+        .lower_A = current_A,
+        .margins = { room_V - heat.resistance_ohm * (allowed_A - measured_A), NAN,
+                     constants->core_K_per_J * left_at_W, NAN },
+    };
 }

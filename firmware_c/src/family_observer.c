@@ -8,18 +8,19 @@
 /* Periods without usable readings that are bridged. */
 #define MAX_BRIDGED 3u
 
-static float larger(float a, float b)
+NUMERIC_INLINE float larger(float a, float b)
 {
     return (a > b) ? a : b;
 }
 
-static float smaller(float a, float b)
+NUMERIC_INLINE float smaller(float a, float b)
 {
     return (a < b) ? a : b;
 }
 
 static void forget_core(family_t *family)
 {
+    family->soc_known = false;
     family->core_is_known = false;
     family->core_room_K = 0.0f;
     family->rest.count = 0u;
@@ -32,7 +33,6 @@ static void forget_core(family_t *family)
 static void forget_after_load(family_t *family, const family_constants_t *constants)
 {
     forget_core(family);
-    family->soc_known = false;
     family->rest_polarisation_V = constants->rest_polarisation_V;
     /* What a load has left goes down as what was there at plug-in. */
     for (uint32_t i = 0u; i < FAMILY_MAX_BRANCHES; i++) {
@@ -40,28 +40,26 @@ static void forget_after_load(family_t *family, const family_constants_t *consta
     }
 }
 
-void family_reset(family_t *family)
+void family_reset(family_t *family, const family_constants_t *constants)
 {
-    *family = (family_t){ .soc_known = false };
+    *family = (family_t){
+        .unknown_ocv_slope_V = family_greatest(constants->ocv_slope_V, 0u, FAMILY_SOC_CELLS),
+        .unknown_entropic_V_per_K =
+            family_greatest(constants->entropic_V_per_K, 0u, FAMILY_SOC_CELLS),
+    };
     forget_core(family);
 }
 
 /* Greatest or least state of charge whose open-circuit voltage may be this one. */
 static float soc_at(const rcbf_constants_t *cell, float voltage_V)
 {
-    uint32_t low = 0u;
-    uint32_t high = cell->ocv_points - 1u;
-    const float clamped = numeric_clamp(voltage_V, cell->ocv_V[low], cell->ocv_V[high]);
-    while (high - low > 1u) {
-        const uint32_t middle = (low + high) / 2u;
-        if (clamped > cell->ocv_V[middle]) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    const float share = (clamped - cell->ocv_V[low]) / (cell->ocv_V[high] - cell->ocv_V[low]);
-    return cell->ocv_soc[low] + share * (cell->ocv_soc[high] - cell->ocv_soc[low]);
+    const uint32_t last = cell->ocv_points - 1u;
+    const float clamped = numeric_clamp(voltage_V, cell->ocv_V[0], cell->ocv_V[last]);
+    const uint32_t segment = numeric_segment(cell->ocv_V, cell->ocv_points, clamped);
+    const float *at_V = &cell->ocv_V[segment];
+    const float *at = &cell->ocv_soc[segment];
+    const float share = (clamped - at_V[0]) / (at_V[1] - at_V[0]);
+    return at[0] + share * (at[1] - at[0]);
 }
 
 static bool is_at_rest(const family_constants_t *constants, const family_reading_t *reading)
@@ -101,7 +99,8 @@ void family_begin(family_t *family, const family_constants_t *constants,
     family->full_count = 0u;
 }
 
-static void follow_supply(family_t *family, const family_constants_t *constants, float command_A)
+NUMERIC_INLINE void follow_supply(family_t *family, const family_constants_t *constants,
+                                  float command_A)
 {
     const float last_A = family->commands_A[0];
     const float earlier_A = family->commands_A[1];
@@ -115,106 +114,101 @@ static void follow_supply(family_t *family, const family_constants_t *constants,
     family->commands_A[0] = command_A;
 }
 
+/* All branches, at what may flow in their resistances. */
+typedef struct {
+    float most_V;
+    float rise_V_per_s; /* of their voltages at a strength that holds on, at most */
+} branches_t;
+
 /* The current in a branch's resistance follows that of the cell as a first-order lag does; whatever
  * its time constant, it stays between one that rises fast and falls slowly and the reverse. */
-static void follow_branches(family_t *family, const family_constants_t *constants, float least_A,
-                            float most_A)
+static branches_t follow_branches(family_t *family, const family_constants_t *constants,
+                                  float least_A, float most_A, float strength_A)
 {
-    family->strongest_A = most_A;
+    branches_t all = { 0.0f, 0.0f };
+    float strongest_A = most_A;
     for (uint32_t i = 0u; i < constants->branches; i++) {
         const family_branch_t *branch = &constants->branch[i];
-        const float up_A = most_A - family->strong_A[i];
-        const float down_A = least_A - family->weak_A[i];
-        family->strong_A[i] += ((up_A > 0.0f) ? branch->fast : branch->slow) * up_A;
-        family->weak_A[i] += ((down_A > 0.0f) ? branch->slow : branch->fast) * down_A;
-        family->strongest_A = larger(family->strongest_A, family->strong_A[i]);
+        float strong_A = family->strong_A[i];
+        float weak_A = family->weak_A[i];
+        const float up_A = most_A - strong_A;
+        const float down_A = least_A - weak_A;
+        strong_A += ((up_A > 0.0f) ? branch->fast : branch->slow) * up_A;
+        weak_A += ((down_A > 0.0f) ? branch->slow : branch->fast) * down_A;
+        family->strong_A[i] = strong_A;
+        family->weak_A[i] = weak_A;
+        strongest_A = larger(strongest_A, strong_A);
+        all.most_V += branch->resistance_ohm * strong_A;
+        all.rise_V_per_s += branch->drift_ohm_per_s * larger(0.0f, strength_A - weak_A);
     }
+    family->strongest_A = strongest_A;
+    return all;
 }
 
-static void follow_charge(family_t *family, const family_constants_t *constants, float strength_A)
+/* Between two readings the current lies between them. */
+NUMERIC_INLINE branches_t follow_charge(family_t *family, const family_constants_t *constants,
+                                        float strength_A)
 {
-    /* Between two readings the current lies between them. */
-    const float least_A =
-        larger(smaller(strength_A, family->strength_A) - constants->current_error_A, 0.0f);
-    const float most_A = larger(family->strength_A, strength_A) + constants->current_error_A;
+    const float error_A = constants->current_error_A;
+    const float before_A = family->strength_A;
+    const float least_A = larger(smaller(strength_A, before_A) - error_A, 0.0f);
+    const float most_A = larger(before_A, strength_A) + error_A;
     family->strength_A = strength_A;
     soc_add(&family->soc_low, least_A * constants->least_soc_per_A);
     soc_add(&family->soc_high, most_A * constants->greatest_soc_per_A);
-    follow_branches(family, constants, least_A, most_A);
     family->rest_polarisation_V *= constants->relaxation;
+    return follow_branches(family, constants, least_A, most_A, strength_A + error_A);
 }
 
-static void look_up(family_t *family, const family_constants_t *constants,
-                    const rcbf_constants_t *cell, const family_reading_t *reading)
+NUMERIC_INLINE void look_up(family_t *family, const family_constants_t *constants,
+                            const rcbf_constants_t *cell, const family_reading_t *reading)
 {
-    const float low = family->soc_known ? family->soc_low.soc : 0.0f;
-    const float high =
-        family->soc_known
-            ? (family->soc_high.soc + constants->hold_soc_per_A * family->strongest_A)
-            : 1.0f;
-    const float entropic_V_per_K = family_greatest(constants->entropic_V_per_K, low, high);
-    family->ocv_slope_V = family_greatest(constants->ocv_slope_V, low, high);
+    float low = 0.0f;
+    if (family->soc_known) {
+        low = family->soc_low.soc;
+        family_look_up_cells(
+            family, constants, low,
+            family->soc_high.soc + constants->hold_soc_per_A * family->strongest_A);
+    } else {
+        family->ocv_slope_V = family->unknown_ocv_slope_V;
+        family->entropic_V_per_K = family->unknown_entropic_V_per_K;
+        family->end_cell = 0u;
+    }
     family->entropic_V =
-        entropic_V_per_K * ((entropic_V_per_K > 0.0f) ? cell->max_core_temperature_K.high_K
-                                                      : constants->coldest_core_K);
+        family->entropic_V_per_K *
+        ((family->entropic_V_per_K > 0.0f) ? cell->max_core_temperature_K.high_K
+                                           : constants->coldest_core_K);
     family->overpotential_V =
-        larger(0.0f, reading->voltage_V - rcbf_open_circuit_voltage_V(cell, low) +
+        larger(0.0f, reading->voltage_V -
+                         rcbf_open_circuit_voltage_near_V(cell, low, &family->ocv_segment) +
                          constants->ocv_error_V + constants->voltage_error_V +
                          2.0f * family->rest_polarisation_V);
 }
 
-/* The branches take up no more than this in a period, whatever they hold. */
-static float polarisation_rise_V(const family_t *family, const family_constants_t *constants,
-                                 float strength_A)
+/* What the branches hold is no more than before and what they take up in a period, nor than what
+ * they hold at their strongest current, or than the overpotential leaves beside the least ohmic
+ * drop. */
+NUMERIC_INLINE void follow_polarisation(family_t *family, const family_constants_t *constants,
+                                        const branches_t *branches, float at_least_A)
 {
-    float rise_V_per_s = 0.0f;
-    for (uint32_t i = 0u; i < constants->branches; i++) {
-        rise_V_per_s += constants->branch[i].drift_ohm_per_s *
-                        larger(0.0f, strength_A - family->weak_A[i]);
-    }
-    return constants->period_s * rise_V_per_s;
-}
-
-/* Nor is it more than they hold at their strongest current, or than the overpotential leaves beside
- * the least ohmic drop. */
-static void follow_polarisation(family_t *family, const family_constants_t *constants)
-{
-    const float most_A = family->strength_A + constants->current_error_A;
-    const float least_A = larger(family->strength_A - constants->current_error_A, 0.0f);
-    float strong_V = 0.0f;
-    for (uint32_t i = 0u; i < constants->branches; i++) {
-        strong_V += constants->branch[i].resistance_ohm * family->strong_A[i];
-    }
-    const float risen_V =
-        family->polarisation_V + polarisation_rise_V(family, constants, most_A);
+    const float risen_V = family->polarisation_V + constants->period_s * branches->rise_V_per_s;
     const float seen_V =
-        larger(0.0f, family->overpotential_V - constants->least_resistance_ohm * least_A);
-    family->polarisation_V = smaller(strong_V, smaller(risen_V, seen_V));
+        larger(0.0f, family->overpotential_V - constants->least_resistance_ohm * at_least_A);
+    family->polarisation_V = smaller(branches->most_V, smaller(risen_V, seen_V));
 }
 
 family_heat_t family_heat(const family_t *family, const family_constants_t *constants,
-                          const family_reading_t *reading)
+                          float strength_A)
 {
-    const float strength_A = larger(-reading->current_A, 0.0f);
     return (family_heat_t){
         .overpotential_V = family->overpotential_V,
         .at_least_A = larger(strength_A - constants->current_error_A, 0.0f),
         .at_most_A = strength_A + constants->current_error_A,
         .past_A = family->strongest_A,
-        .resistance_ohm = family_resistance_ohm(
-            constants, reading->surface_temperature_K - constants->surface_error_K),
+        .resistance_ohm = family->resistance_ohm,
         .least_resistance_ohm = constants->least_resistance_ohm,
         .polarisation_ohm = constants->polarisation_ohm,
     };
-}
-
-static float heat_now_W(const family_t *family, const family_constants_t *constants,
-                        const family_reading_t *reading)
-{
-    const family_heat_t heat = family_heat(family, constants, reading);
-    const float measured_W = family_measured_heat_W(&heat, heat.at_most_A);
-    const float assumed_W = family_assumed_heat_W(&heat, heat.at_most_A);
-    return smaller(measured_W, assumed_W) + family->entropic_V * heat.at_most_A;
 }
 
 /* The core obeys C T' = heat - (T - Ts) / R + C nu, and the right-hand side is largest for the
@@ -222,11 +216,14 @@ static float heat_now_W(const family_t *family, const family_constants_t *consta
  * C stays above every core of the family. A core below its surface is warmed the more the smaller R
  * is, so that the bound is no lower than the surface. A fall is taken at its end, where it is
  * slowest. */
-static void follow_core(family_t *family, const family_constants_t *constants,
-                        const rcbf_constants_t *cell, const family_reading_t *reading)
+NUMERIC_INLINE void follow_core(family_t *family, const family_constants_t *constants,
+                                const rcbf_constants_t *cell, const family_reading_t *reading,
+                                const family_heat_t *heat)
 {
-    const float heat_W = heat_now_W(family, constants, reading);
-    const float strength_A = larger(-reading->current_A, 0.0f) + constants->current_error_A;
+    const float strength_A = heat->at_most_A;
+    const float heat_W = smaller(family_measured_heat_W(heat, strength_A),
+                                 family_assumed_heat_W(heat, strength_A)) +
+                         family->entropic_V * strength_A;
     const float surface_K =
         larger(reading->surface_temperature_K, family->surface_temperature_K);
     const float surface_room_K = (cell->max_core_temperature_K.high_K - surface_K) +
@@ -246,13 +243,12 @@ static void follow_core(family_t *family, const family_constants_t *constants,
 }
 
 /* What resistance and polarisation cannot explain of the voltage is open-circuit voltage. */
-static void look_for_full(family_t *family, const family_constants_t *constants,
-                          const family_reading_t *reading)
+NUMERIC_INLINE void look_for_full(family_t *family, const family_constants_t *constants,
+                                  const family_reading_t *reading, float at_most_A)
 {
-    const family_heat_t heat = family_heat(family, constants, reading);
     const float least_ocv_V =
         reading->voltage_V - constants->voltage_error_V - constants->ocv_error_V -
-        family->rest_polarisation_V - heat.resistance_ohm * heat.at_most_A -
+        family->rest_polarisation_V - family->resistance_ohm * at_most_A -
         family->polarisation_V;
     const bool is_full = reading->is_charging && (least_ocv_V >= constants->full_ocv_V);
     family->full_count = is_full ? (family->full_count + 1u) : 0u;
@@ -276,8 +272,9 @@ static void bridge(family_t *family, const family_constants_t *constants)
         .polarisation_ohm = constants->polarisation_ohm,
     };
     soc_add(&family->soc_high, strength_A * constants->greatest_soc_per_A);
-    family->polarisation_V += polarisation_rise_V(family, constants, strength_A);
-    follow_branches(family, constants, 0.0f, strength_A);
+    family->polarisation_V +=
+        constants->period_s * family_rise_V_per_s(family, constants, strength_A);
+    (void)follow_branches(family, constants, 0.0f, strength_A, strength_A);
     family->strength_A = strength_A;
     family->core_room_K -=
         constants->heating_K_per_W *
@@ -291,25 +288,30 @@ void family_observe(family_t *family, const family_constants_t *constants,
                     const rcbf_constants_t *cell, const family_reading_t *reading)
 {
     follow_supply(family, constants, larger(-reading->command_A, 0.0f));
+    family->resistance_ohm = family_resistance_ohm(
+        constants, reading->surface_temperature_K - constants->surface_error_K);
     if (!reading->is_usable) {
         bridge(family, constants);
         return;
     }
     family->bridged = 0u;
     const float strength_A = larger(-reading->current_A, 0.0f);
-    follow_charge(family, constants, strength_A);
+    const branches_t branches = follow_charge(family, constants, strength_A);
     look_up(family, constants, cell, reading);
-    follow_polarisation(family, constants);
-    look_for_full(family, constants, reading);
-    if (is_at_rest(constants, reading)) {
-        follow_core(family, constants, cell, reading);
+    const family_heat_t heat = family_heat(family, constants, strength_A);
+    follow_polarisation(family, constants, &branches, heat.at_least_A);
+    look_for_full(family, constants, reading, heat.at_most_A);
+    const bool rests = is_at_rest(constants, reading);
+    if (!rests && !reading->is_charging) {
+        forget_after_load(family, constants);
+        return;
+    }
+    follow_core(family, constants, cell, reading, &heat);
+    if (rests) {
         family_look_at_rest(family, constants, cell, reading);
         family->charge.count = 0u;
-    } else if (reading->is_charging) {
-        follow_core(family, constants, cell, reading);
+    } else {
         family_look_in_charge(family, constants, cell, reading);
         family->rest.count = 0u;
-    } else {
-        forget_after_load(family, constants);
     }
 }

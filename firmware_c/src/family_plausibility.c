@@ -40,12 +40,15 @@ bool family_voltage_is_plausible(const family_t *family, const family_constants_
                                  const rcbf_constants_t *cell, const family_reading_t *reading,
                                  float deviation_V)
 {
-    const family_heat_t heat = family_heat(family, constants, reading);
+    const float strength_A = (reading->current_A < 0.0f) ? -reading->current_A : 0.0f;
+    const float less_A = strength_A - constants->current_error_A;
+    const float at_least_A = (less_A > 0.0f) ? less_A : 0.0f;
+    const float at_most_A = strength_A + constants->current_error_A;
     const float spread_V = constants->ocv_error_V + family->rest_polarisation_V + deviation_V;
     const float low_V = rcbf_open_circuit_voltage_V(cell, family->soc_low.soc) +
-                        heat.least_resistance_ohm * heat.at_least_A - spread_V;
+                        constants->least_resistance_ohm * at_least_A - spread_V;
     const float high_V = rcbf_open_circuit_voltage_V(cell, family->soc_high.soc) +
-                         heat.resistance_ohm * heat.at_most_A +
+                         family->resistance_ohm * at_most_A +
                          family->polarisation_V + spread_V;
     return (reading->voltage_V >= low_V) && (reading->voltage_V <= high_V);
 }

@@ -28,20 +28,62 @@ float family_resistance_ohm(const family_constants_t *constants, float temperatu
     return ohm[0] + share * (ohm[1] - ohm[0]);
 }
 
-static uint32_t cell_of(float soc)
+uint32_t family_soc_cell(float soc)
 {
     return (uint32_t)numeric_clamp(soc * (float)FAMILY_SOC_CELLS, 0.0f,
                                    (float)(FAMILY_SOC_CELLS - 1));
 }
 
-float family_greatest(const float *cells, float soc_low, float soc_high)
+float family_greatest(const float *cells, uint32_t first, uint32_t end)
 {
-    const uint32_t last = cell_of(soc_high);
-    float greatest = cells[last];
-    for (uint32_t i = cell_of(soc_low); i < last; i++) {
-        greatest = larger(greatest, cells[i]);
+    const float *last = &cells[end - 1u];
+    float greatest = *last;
+    for (const float *cell = &cells[first]; cell < last; cell++) {
+        greatest = larger(greatest, *cell);
     }
     return greatest;
+}
+
+/* Greatest value of the cells from first to before end; `greatest` is that of those from was_first
+ * to before was_end, which mostly tells it. */
+static float greatest_of(const float *cells, float greatest, uint32_t was_first, uint32_t was_end,
+                         uint32_t first, uint32_t end)
+{
+    bool is_known = (first >= was_first) && (first < was_end) && (end >= was_end) &&
+                    (end - was_end <= 1u);
+    for (uint32_t i = was_first; is_known && (i < first); i++) {
+        is_known = cells[i] < greatest;
+    }
+    return is_known ? larger(greatest, cells[end - 1u]) : family_greatest(cells, first, end);
+}
+
+void family_look_up_cells(family_t *family, const family_constants_t *constants, float soc_low,
+                          float soc_high)
+{
+    const uint32_t first = family_soc_cell(soc_low);
+    const uint32_t end = family_soc_cell(soc_high) + 1u;
+    const uint32_t was_first = family->first_cell;
+    const uint32_t was_end = family->end_cell;
+    if ((first != was_first) || (end != was_end)) {
+        family->ocv_slope_V = greatest_of(constants->ocv_slope_V, family->ocv_slope_V, was_first,
+                                          was_end, first, end);
+        family->entropic_V_per_K = greatest_of(constants->entropic_V_per_K,
+                                               family->entropic_V_per_K, was_first, was_end,
+                                               first, end);
+        family->first_cell = (uint8_t)first;
+        family->end_cell = (uint8_t)end;
+    }
+}
+
+float family_rise_V_per_s(const family_t *family, const family_constants_t *constants,
+                          float strength_A)
+{
+    float rise_V_per_s = 0.0f;
+    for (uint32_t i = 0u; i < constants->branches; i++) {
+        rise_V_per_s += constants->branch[i].drift_ohm_per_s *
+                        larger(0.0f, strength_A - family->weak_A[i]);
+    }
+    return rise_V_per_s;
 }
 
 static uint32_t below(const float *axis, uint32_t points, float at)

@@ -7,8 +7,19 @@
 /* Greatest ohmic resistance of a cell whose coldest part has this temperature. */
 float family_resistance_ohm(const family_constants_t *constants, float temperature_K);
 
-/* Greatest value of any cell of the grid between two states of charge. */
-float family_greatest(const float *cells, float soc_low, float soc_high);
+/* Cell of the grid that a state of charge is in. */
+uint32_t family_soc_cell(float soc);
+
+/* Greatest value of any cell of the grid from the first to the one before the end. */
+float family_greatest(const float *cells, uint32_t first, uint32_t end);
+
+/* Greatest slope and entropic coefficient between two states of charge, into the family. */
+void family_look_up_cells(family_t *family, const family_constants_t *constants, float soc_low,
+                          float soc_high);
+
+/* Rise of the branches' voltages at a strength that holds on, at most. */
+float family_rise_V_per_s(const family_t *family, const family_constants_t *constants,
+                          float strength_A);
 
 /* Strongest current that the map allows. */
 float family_mapped_A(const family_map_t *map, float temperature_K, float soc);
@@ -25,9 +36,9 @@ typedef struct {
     float polarisation_ohm;
 } family_heat_t;
 
-/* That of the cell at hand, from readings and what is known. */
+/* That of the cell at hand, from what the observer has made of the last readings, at a strength. */
 family_heat_t family_heat(const family_t *family, const family_constants_t *constants,
-                          const family_reading_t *reading);
+                          float strength_A);
 
 /* From the hottest core that is possible, by observer or estimate, to the limit. */
 float family_core_room_K(const family_t *family, const family_constants_t *constants,

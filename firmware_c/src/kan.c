@@ -1,5 +1,7 @@
 #include "kan.h"
 
+#include <math.h>
+
 #include "numeric.h"
 
 /* An input on a face of the box may come out of the scaling this much outside. */
@@ -49,7 +51,7 @@ static bool domain_is_valid(const kan_model_t *model)
     bool valid = (model->input_reach >= 1.0f) && numeric_is_finite(model->input_reach);
     for (uint32_t i = 0u; i < model->directions; i++) {
         const kan_direction_t *direction = &model->direction[i];
-        valid = valid && numeric_all_finite(direction->component, model->width[0]) &&
+        valid = valid && numeric_all_finite(direction->component, KAN_MAX_WIDTH) &&
                 numeric_is_finite(direction->low) && numeric_is_finite(direction->high) &&
                 (direction->low < direction->high);
     }
@@ -67,9 +69,12 @@ bool kan_model_is_valid(const kan_model_t *model)
                  numeric_is_finite(model->output_center_K) &&
                  numeric_is_finite(model->output_half_range_K);
     const uint32_t edges = edge_count(model);
+    const uint32_t from_inputs = model->width[0] * model->width[1];
     for (uint32_t edge = 0u; edge < edges; edge++) {
         const float *knots = &model->knots[edge * (model->cells + 1u)];
-        valid = valid && numeric_rises(knots, model->cells + 1u);
+        valid = valid && numeric_rises(knots, model->cells + 1u) &&
+                ((edge >= from_inputs) || ((knots[0] <= -model->input_reach) &&
+                                     (knots[model->cells] >= model->input_reach)));
     }
     return valid && numeric_all_finite(model->coefficients,
                                        edges * model->cells * KAN_CELL_COEFFICIENTS);
@@ -77,48 +82,61 @@ bool kan_model_is_valid(const kan_model_t *model)
 
 typedef char kan_horner_has_all_coefficients[(KAN_CELL_COEFFICIENTS == 8) ? 1 : -1];
 
-static inline float edge_value(const float *knots, const float *coefficients, uint32_t cells,
-                               float x, bool *in_domain)
+/* Value of an edge at x, no less than its first knot and no more than its last. The pointers are
+ * those of its last cell; the first knot ends the search. */
+NUMERIC_INLINE float value_within(const float *knot, const float *c, float x)
 {
-    /* Written so that an argument within the knots takes two comparisons, and NaN the first way. */
-    const float first = knots[0];
-    const float last = knots[cells];
-    float inside = x;
-    if (!(x >= first)) {
-        inside = first;
-        *in_domain &= (first - x <= KAN_FACE_TOLERANCE);
-    } else if (!(x <= last)) {
-        inside = last;
-        *in_domain &= (x - last <= KAN_FACE_TOLERANCE);
+    while (x < knot[0]) {
+        knot--;
+        c -= KAN_CELL_COEFFICIENTS;
     }
-    uint32_t cell = 0u;
-    while ((cell + 1u < cells) && (inside >= knots[cell + 1u])) {
-        cell++;
-    }
-    const float middle = 0.5f * (knots[cell] + knots[cell + 1u]);
-    const float d = inside - middle;
-    const float *c = &coefficients[cell * KAN_CELL_COEFFICIENTS];
+    const float d = x - 0.5f * (knot[0] + knot[1]);
     return ((((((c[7] * d + c[6]) * d + c[5]) * d + c[4]) * d + c[3]) * d + c[2]) * d + c[1]) * d +
            c[0];
+}
+
+NUMERIC_INLINE float clamped(float first, float last, float x, bool *in_domain)
+{
+    /* Written so that an argument within the knots takes two comparisons, and NaN the first way. */
+    if (!(x >= first)) {
+        *in_domain = *in_domain && (first - x <= KAN_FACE_TOLERANCE);
+        return first;
+    }
+    if (!(x <= last)) {
+        *in_domain = *in_domain && (x - last <= KAN_FACE_TOLERANCE);
+        return last;
+    }
+    return x;
 }
 
 float kan_edge_value(const kan_model_t *model, uint32_t edge, float x, bool *in_domain)
 {
     const uint32_t cells = model->cells;
-    return edge_value(&model->knots[edge * (cells + 1u)],
-                      &model->coefficients[edge * cells * KAN_CELL_COEFFICIENTS], cells, x,
-                      in_domain);
+    const float *knots = &model->knots[edge * (cells + 1u)];
+    const float *last = &model->coefficients[((edge + 1u) * cells - 1u) * KAN_CELL_COEFFICIENTS];
+    return value_within(&knots[cells - 1u], last, clamped(knots[0], knots[cells], x, in_domain));
 }
 
-/* False for NaN, which compares with nothing. */
-static bool is_in_slabs(const kan_model_t *model, const float *normalised)
+#define BLOCK 4u
+
+/* False for NaN, which compares with nothing. Inputs come in blocks, of which those beyond the last
+ * input are 0. */
+NUMERIC_INLINE bool is_in_slabs(const kan_model_t *model, const float *normalised)
 {
-    const uint32_t inputs = model->width[0];
-    const kan_direction_t *end = &model->direction[model->directions];
-    for (const kan_direction_t *direction = model->direction; direction < end; direction++) {
-        float along = 0.0f;
-        for (uint32_t i = 0u; i < inputs; i++) {
-            along += direction->component[i] * normalised[i];
+    const kan_direction_t *direction = model->direction;
+    const kan_direction_t *end = &direction[model->directions];
+    const bool is_wide = model->width[0] > BLOCK;
+    for (; direction < end; direction++) {
+        const float *c = direction->component;
+        float along = c[0] * normalised[0];
+        along += c[1] * normalised[1];
+        along += c[2] * normalised[2];
+        along += c[3] * normalised[3];
+        if (is_wide) {
+            along += c[4] * normalised[4];
+            along += c[5] * normalised[5];
+            along += c[6] * normalised[6];
+            along += c[7] * normalised[7];
         }
         if (!((along >= direction->low) && (along <= direction->high))) {
             return false;
@@ -127,46 +145,102 @@ static bool is_in_slabs(const kan_model_t *model, const float *normalised)
     return true;
 }
 
+/* Inputs beyond the trained box act no further than the reach, and are flagged. */
+static bool clamp_to_reach(const kan_model_t *model, float *nodes)
+{
+    bool in_domain = true;
+    for (uint32_t i = 0u; i < model->width[0]; i++) {
+        const float value = nodes[i];
+        const float magnitude = fabsf(value);
+        if (!(magnitude <= 1.0f)) {
+            in_domain = in_domain && (magnitude <= KAN_FACE);
+            nodes[i] = numeric_clamp(value, -model->input_reach, model->input_reach);
+        }
+    }
+    return in_domain;
+}
+
+/* The tables of an edge's last cell, and the steps to those of the next edge. */
+typedef struct {
+    const float *knot;
+    const float *c;
+    uint32_t knots;
+    uint32_t coefficients;
+} edge_walk_t;
+
+/* Sum of the edges that lead from all nodes to one. The first layer's knots span its nodes. */
+NUMERIC_INLINE float sum_of_edges(edge_walk_t *walk, const float *nodes, const float *end,
+                                  bool is_first, bool *in_domain)
+{
+    const float *knot = walk->knot;
+    const float *c = walk->c;
+    float sum = 0.0f;
+    do {
+        float x = *nodes;
+        nodes++;
+        if (!is_first) {
+            const float *const last = &knot[1];
+            x = clamped(*(last + 1u - walk->knots), *last, x, in_domain);
+        }
+        sum += value_within(knot, c, x);
+        knot += walk->knots;
+        c += walk->coefficients;
+    } while (nodes < end);
+    walk->knot = knot;
+    walk->c = c;
+    return sum;
+}
+
 kan_estimate_t kan_evaluate(const kan_model_t *model, const float *inputs)
 {
-    float normalised[KAN_MAX_WIDTH];
     float layers[2][KAN_MAX_WIDTH];
     float *nodes = layers[0];
     float *sums = layers[1];
-    kan_estimate_t estimate = { 0.0f, true };
-    for (uint32_t i = 0u; i < model->width[0]; i++) {
-        const float value = (inputs[i] - model->input_center[i]) * model->input_scale[i];
-        normalised[i] = value;
-        float node = value;
-        if (!((value >= -1.0f) && (value <= 1.0f))) {
-            node = numeric_clamp(value, -model->input_reach, model->input_reach);
-            if (!((value >= -KAN_FACE) && (value <= KAN_FACE))) {
-                estimate.in_domain = false;
-            }
+    bool in_domain = true;
+    bool in_box = true;
+    const float *center = model->input_center;
+    const float *scale = model->input_scale;
+    float *const end = &nodes[model->width[0]];
+    float *node = nodes;
+    do {
+        const float value = (*inputs - *center) * *scale;
+        inputs++;
+        center++;
+        scale++;
+        *node = value;
+        node++;
+        if (!(fabsf(value) <= 1.0f)) {
+            in_box = false;
         }
-        nodes[i] = node;
+    } while (node < end);
+    if (model->width[0] > BLOCK) {
+        while (node < &layers[0][KAN_MAX_WIDTH]) {
+            *node = 0.0f;
+            node++;
+        }
     }
-    if (!is_in_slabs(model, normalised)) {
-        estimate.in_domain = false;
+    if (!is_in_slabs(model, nodes)) {
+        in_domain = false;
+    }
+    if (!in_box && !clamp_to_reach(model, nodes)) {
+        in_domain = false;
     }
     const uint32_t cells = model->cells;
-    const float *knots = model->knots;
-    const float *coefficients = model->coefficients;
-    for (uint32_t layer = 0u; layer < model->layers; layer++) {
-        for (uint32_t to = 0u; to < model->width[layer + 1u]; to++) {
-            float sum = 0.0f;
-            for (uint32_t from = 0u; from < model->width[layer]; from++) {
-                sum += edge_value(knots, coefficients, cells, nodes[from], &estimate.in_domain);
-                knots += cells + 1u;
-                coefficients += cells * KAN_CELL_COEFFICIENTS;
-            }
-            sums[to] = sum;
-        }
+    edge_walk_t walk = { &model->knots[cells - 1u],
+                         &model->coefficients[(cells - 1u) * KAN_CELL_COEFFICIENTS], cells + 1u,
+                         cells * KAN_CELL_COEFFICIENTS };
+    const uint32_t *width = &model->width[1];
+    for (uint32_t to = 0u; to < *width; to++) {
+        sums[to] = sum_of_edges(&walk, nodes, end, true, &in_domain);
+    }
+    for (const uint32_t *last = &model->width[model->layers]; width < last; width++) {
         float *const spent = nodes;
         nodes = sums;
         sums = spent;
+        for (uint32_t to = 0u; to < width[1]; to++) {
+            sums[to] = sum_of_edges(&walk, nodes, &nodes[*width], false, &in_domain);
+        }
     }
-    estimate.core_temperature_K =
-        model->output_center_K + model->output_half_range_K * nodes[0];
-    return estimate;
+    return (kan_estimate_t){ model->output_center_K + model->output_half_range_K * sums[0],
+                             in_domain };
 }

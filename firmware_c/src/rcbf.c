@@ -12,23 +12,40 @@
 #define HIGHEST_SOC 1.1f
 #define LARGEST_INPUT 1e4f
 
-/* constant + linear u + quadratic u^2 >= 0 with quadratic <= 0 */
+/* Smallest of the constants that are positive: far below any cell's, and no product of it with
+ * LEAST_CONSTANT underflows. */
+#define LEAST_POSITIVE 1e-20f
+/* A constraint that leaves less than this at 0 A is solved whatever its value is elsewhere. */
+#define LEAST_CONSTANT 1e-12f
+/* Share of its terms that a function has to be above 0, for its roots to be left alone. */
+#define CLEARLY 1e-5f
+
+/* constant + linear u >= 0 with linear > 0 */
+typedef struct {
+    float constant;
+    float linear;
+} line_t;
+
+/* constant + linear u + quadratic u^2 >= 0 with quadratic < 0 */
 typedef struct {
     float constant;
     float linear;
     float quadratic;
 } concave_t;
 
+/* Currents that all constraints so far admit, and the one that the lower end is from. */
 typedef struct {
-    float lower;
-    float upper;
+    float lower_A;
+    float upper_A;
+    rcbf_active_t active;
 } interval_t;
 
-static const interval_t EMPTY = { 1.0f, -1.0f };
-
-/* The four constraints. A worst-case error term - |p + q u| e makes two concave functions of one,
- * of which the smaller holds. */
-enum { VOLTAGE, SOC, CORE_ABOVE, CORE_BELOW, SURFACE_ABOVE, SURFACE_BELOW, FUNCTIONS };
+/* A constraint with a worst-case error term: mean - |rest + slope u| >= 0. */
+typedef struct {
+    concave_t mean;
+    float rest;
+    float slope;
+} robust_t;
 
 /* Numbers that are close to each other subtract exactly, so that little is lost. */
 static float difference_K(rcbf_temperature_t a, rcbf_temperature_t b)
@@ -36,165 +53,240 @@ static float difference_K(rcbf_temperature_t a, rcbf_temperature_t b)
     return (a.high_K - b.high_K) + (a.low_K - b.low_K);
 }
 
-static void split(concave_t nominal, float p, float q, float error_bound, concave_t pair[2])
+NUMERIC_INLINE line_t voltage_left(const rcbf_constants_t *k, const rcbf_input_t *in)
 {
-    const float rest = p * error_bound;
-    const float slope = q * error_bound;
-    pair[0] = (concave_t){ nominal.constant - rest, nominal.linear - slope, nominal.quadratic };
-    pair[1] = (concave_t){ nominal.constant + rest, nominal.linear + slope, nominal.quadratic };
-}
-
-static void build(const rcbf_constants_t *k, const rcbf_input_t *in, concave_t functions[FUNCTIONS])
-{
-    const float core_K = in->core_temperature_K.high_K;
-    const float core_above_surface_K =
-        difference_K(in->core_temperature_K, in->surface_temperature_K);
-    const concave_t core = {
-        k->a1_per_s * core_above_surface_K +
-            k->alpha2_per_s * difference_K(k->max_core_temperature_K, in->core_temperature_K) -
-            (k->core_uncertainty_K_per_s + k->core_margin_K_per_s),
-        k->a2_per_As * core_K,
-        -k->a3_K_per_A2s,
-    };
-    const concave_t surface = {
-        k->a4_per_s2 * core_above_surface_K +
-            k->a6_per_s2 * difference_K(in->coolant_temperature_K, in->surface_temperature_K) +
-            k->alpha3_per_s2 *
-                difference_K(k->max_surface_temperature_K, in->surface_temperature_K) +
-            k->a10_K_per_Ws2 * in->cooling_power_W -
-            (k->delta4_K_per_s2 + k->surface_margin_K_per_s2),
-        k->a8_per_As2 * core_K,
-        k->a9_K_per_A2s2,
-    };
-    const float e_K = k->estimation_error_bound_K;
-    functions[VOLTAGE] = (concave_t){
+    return (line_t){
         k->max_voltage_V - rcbf_open_circuit_voltage_V(k, in->soc) - k->voltage_margin_V,
         k->ohmic_resistance_ohm,
-        0.0f,
     };
-    functions[SOC] = (concave_t){
+}
+
+NUMERIC_INLINE line_t soc_left(const rcbf_constants_t *k, const rcbf_input_t *in)
+{
+    return (line_t){
         k->alpha1_per_s * (k->max_soc - in->soc) - k->soc_uncertainty_per_s - k->soc_margin_per_s,
         1.0f / k->capacity_As,
-        0.0f,
     };
-    split(core, k->a1_per_s - k->alpha2_per_s, k->a2_per_As, e_K, &functions[CORE_ABOVE]);
-    split(surface, k->a4_per_s2, k->a8_per_As2, e_K, &functions[SURFACE_ABOVE]);
 }
 
-/* Where a function with quadratic <= 0 is not negative. */
-static interval_t admitted(const concave_t *f)
+NUMERIC_INLINE robust_t core_left(const rcbf_constants_t *k, const rcbf_input_t *in)
 {
-    interval_t interval = { -FLT_MAX, FLT_MAX };
-    const float constant = f->constant;
-    if (f->quadratic < 0.0f) {
-        const float discriminant = f->linear * f->linear - 4.0f * f->quadratic * constant;
-        if (!(discriminant >= 0.0f)) {
-            return EMPTY;
-        }
-        /* Adds numbers of one sign only, so that no root loses digits. */
-        const float root = sqrtf(discriminant);
-        const float sum = -0.5f * (f->linear + ((f->linear < 0.0f) ? -root : root));
-        const float first = sum / f->quadratic;
-        const float second = (sum != 0.0f) ? (constant / sum) : 0.0f;
-        interval.lower = (first < second) ? first : second;
-        interval.upper = (first < second) ? second : first;
-    } else if (f->linear > 0.0f) {
-        interval.lower = -constant / f->linear;
-    } else if (f->linear < 0.0f) {
-        interval.upper = -constant / f->linear;
-    } else if (!(constant >= 0.0f)) {
-        interval = EMPTY;
-    }
-    return interval;
+    const float e_K = k->estimation_error_bound_K;
+    return (robust_t){
+        {
+            k->a1_per_s * difference_K(in->core_temperature_K, in->surface_temperature_K) +
+                k->alpha2_per_s * difference_K(k->max_core_temperature_K, in->core_temperature_K) -
+                (k->core_uncertainty_K_per_s + k->core_margin_K_per_s),
+            k->a2_per_As * in->core_temperature_K.high_K,
+            -k->a3_K_per_A2s,
+        },
+        (k->a1_per_s - k->alpha2_per_s) * e_K,
+        k->a2_per_As * e_K,
+    };
 }
 
-static float value_at(const concave_t *f, float u)
+NUMERIC_INLINE robust_t surface_left(const rcbf_constants_t *k, const rcbf_input_t *in)
 {
-    return f->constant + u * (f->linear + u * f->quadratic);
+    const float e_K = k->estimation_error_bound_K;
+    return (robust_t){
+        {
+            k->a4_per_s2 * difference_K(in->core_temperature_K, in->surface_temperature_K) +
+                k->a6_per_s2 * difference_K(in->coolant_temperature_K, in->surface_temperature_K) +
+                k->alpha3_per_s2 *
+                    difference_K(k->max_surface_temperature_K, in->surface_temperature_K) +
+                k->a10_K_per_Ws2 * in->cooling_power_W -
+                (k->delta4_K_per_s2 + k->surface_margin_K_per_s2),
+            k->a8_per_As2 * in->core_temperature_K.high_K,
+            k->a9_K_per_A2s2,
+        },
+        k->a4_per_s2 * e_K,
+        k->a8_per_As2 * e_K,
+    };
 }
 
-static float smaller(float a, float b)
+/* The two functions of which the smaller is a constraint with its error term. */
+NUMERIC_INLINE concave_t less_error(const robust_t *f)
+{
+    return (concave_t){ f->mean.constant - f->rest, f->mean.linear - f->slope,
+                        f->mean.quadratic };
+}
+
+NUMERIC_INLINE concave_t plus_error(const robust_t *f)
+{
+    return (concave_t){ f->mean.constant + f->rest, f->mean.linear + f->slope,
+                        f->mean.quadratic };
+}
+
+NUMERIC_INLINE float value_at(concave_t f, float u)
+{
+    return f.constant + u * (f.linear + u * f.quadratic);
+}
+
+NUMERIC_INLINE float smaller(float a, float b)
 {
     return (a < b) ? a : b;
 }
 
-static bool is_within(float value, float low, float high)
+NUMERIC_INLINE float least_value_at(const robust_t *f, float u)
 {
-    return (value >= low) && (value <= high);
+    return smaller(value_at(less_error(f), u), value_at(plus_error(f), u));
+}
+
+/* Takes what a function does not admit from an interval. */
+static void narrow(interval_t *to, concave_t f, rcbf_active_t name)
+{
+    float lower_A = 1.0f;
+    float upper_A = -1.0f;
+    const float discriminant = f.linear * f.linear - 4.0f * f.quadratic * f.constant;
+    if (discriminant >= 0.0f) {
+        /* Adds numbers of one sign only, so that no root loses digits. */
+        const float root = sqrtf(discriminant);
+        const float sum = -0.5f * (f.linear + ((f.linear < 0.0f) ? -root : root));
+        const float first = sum / f.quadratic;
+        const float second = (sum != 0.0f) ? (f.constant / sum) : 0.0f;
+        lower_A = (first < second) ? first : second;
+        upper_A = (first < second) ? second : first;
+    }
+    if (lower_A > to->lower_A) {
+        to->lower_A = lower_A;
+        to->active = name;
+    }
+    if (upper_A < to->upper_A) {
+        to->upper_A = upper_A;
+    }
+}
+
+/* The end of what a line that rises with u admits. */
+NUMERIC_INLINE void narrow_by_line(interval_t *to, line_t f, rcbf_active_t name)
+{
+    const float lower_A = -f.constant / f.linear;
+    if (lower_A > to->lower_A) {
+        to->lower_A = lower_A;
+        to->active = name;
+    }
+}
+
+/* Narrows by both functions of a constraint with an error term, but for those that leave all.
+ *
+ * A concave function that is above 0 at 0 A and at u is so between them, and has its roots beyond
+ * both. So have their computed values if it is above 0 by enough. With S the sum of the magnitudes
+ * of its constant and quadratic terms at u, the value at u is off by 12 roundings of S at most; a
+ * root r, which is off by 5 roundings of itself, is as far from u as value / sqrt(discriminant) at
+ * least, and |r| sqrt(discriminant) <= 4 S where |r| < 2 |u|. So a value of 32 roundings of S is
+ * enough; the constant of either function is at most twice that of the mean, which makes it 64, or
+ * 4e-6 of the mean's S. The upper function lies above the lower one, and its S is no larger nearer
+ * to 0. A number that is none fails each comparison. */
+NUMERIC_INLINE void narrow_by_both(interval_t *to, const robust_t *f, rcbf_active_t name)
+{
+    const float quadratic = f->mean.quadratic;
+    const float u = smaller(to->lower_A, 0.0f);
+    const bool is_above = f->rest + u * f->slope < 0.0f;
+    const float rest = is_above ? -f->rest : f->rest;
+    const float slope = is_above ? -f->slope : f->slope;
+    const float enough = CLEARLY * (f->mean.constant - u * u * quadratic);
+    const bool is_open = f->mean.constant - fabsf(rest) > LEAST_CONSTANT;
+    const concave_t lower = { f->mean.constant - rest, f->mean.linear - slope, quadratic };
+    if (is_open && (value_at(lower, u) > enough)) {
+        return;
+    }
+    narrow(to, lower, name);
+    const concave_t upper = { f->mean.constant + rest, f->mean.linear + slope, quadratic };
+    if (!(is_open && (value_at(upper, smaller(to->lower_A, 0.0f)) > enough))) {
+        narrow(to, upper, name);
+    }
+}
+
+/* Numbers from 0 up compare as their bits do, and NaN comes after all of them. */
+NUMERIC_INLINE uint32_t bits_of(float value)
+{
+    const union {
+        float value;
+        uint32_t bits;
+    } both = { value };
+    return both.bits;
+}
+
+/* Whether the magnitude is, for a largest one from 0 up; the sign is shifted out. */
+NUMERIC_INLINE bool is_no_larger(float value, float largest)
+{
+    return (bits_of(value) << 1u) <= (bits_of(largest) << 1u);
 }
 
 /* The low part is what float32 cannot hold of the sum, no more. */
-static bool is_temperature(rcbf_temperature_t temperature)
+NUMERIC_INLINE bool is_temperature(rcbf_temperature_t temperature)
 {
-    return is_within(temperature.high_K, COLDEST_K, HOTTEST_K) &&
-           is_within(temperature.low_K, -LARGEST_LOW_PART_K, LARGEST_LOW_PART_K);
+    return (bits_of(temperature.high_K) - bits_of(COLDEST_K) <=
+            bits_of(HOTTEST_K) - bits_of(COLDEST_K)) &&
+           is_no_larger(temperature.low_K, LARGEST_LOW_PART_K);
 }
 
-static bool is_physical(const rcbf_input_t *in)
+NUMERIC_INLINE bool is_physical(const rcbf_input_t *in)
 {
     return is_temperature(in->core_temperature_K) && is_temperature(in->surface_temperature_K) &&
-           is_temperature(in->coolant_temperature_K) &&
-           is_within(in->soc, LOWEST_SOC, HIGHEST_SOC) &&
-           is_within(in->cooling_power_W, -LARGEST_INPUT, LARGEST_INPUT) &&
-           is_within(in->reference_current_A, -LARGEST_INPUT, 0.0f);
+           is_temperature(in->coolant_temperature_K) && (in->soc >= LOWEST_SOC) &&
+           (in->soc <= HIGHEST_SOC) && is_no_larger(in->cooling_power_W, LARGEST_INPUT) &&
+           is_no_larger(in->reference_current_A, LARGEST_INPUT) &&
+           (in->reference_current_A <= 0.0f);
 }
 
 rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t *input)
 {
-    static const rcbf_active_t NAME[FUNCTIONS] = { RCBF_VOLTAGE, RCBF_SOC,     RCBF_CORE,
-                                                   RCBF_CORE,    RCBF_SURFACE, RCBF_SURFACE };
-    rcbf_decision_t decision = { 0.0f, false, RCBF_INVALID, 0.0f, 0.0f, { 0.0f } };
     if (!is_physical(input)) {
-        return decision;
+        return (rcbf_decision_t){ .active = RCBF_INVALID };
     }
-    concave_t functions[FUNCTIONS];
-    build(constants, input, functions);
-
-    decision.active = RCBF_NONE;
-    decision.lower_A = input->reference_current_A;
-    for (uint32_t i = 0u; i < FUNCTIONS; i++) {
-        const interval_t interval = admitted(&functions[i]);
-        if (interval.lower > decision.lower_A) {
-            decision.lower_A = interval.lower;
-            decision.active = NAME[i];
-        }
-        if (interval.upper < decision.upper_A) {
-            decision.upper_A = interval.upper;
-        }
+    const line_t voltage = voltage_left(constants, input);
+    const line_t soc = soc_left(constants, input);
+    const robust_t robust[2] = { core_left(constants, input), surface_left(constants, input) };
+    interval_t interval = { input->reference_current_A, 0.0f, RCBF_NONE };
+    narrow_by_line(&interval, voltage, RCBF_VOLTAGE);
+    narrow_by_line(&interval, soc, RCBF_SOC);
+    for (uint32_t i = 0u; i < 2u; i++) {
+        narrow_by_both(&interval, &robust[i], (i == 0u) ? RCBF_CORE : RCBF_SURFACE);
     }
-    decision.feasible = decision.lower_A <= decision.upper_A;
-    decision.current_A = decision.feasible ? decision.lower_A : 0.0f;
-    if (!decision.feasible) {
-        decision.active = RCBF_INFEASIBLE;
-    }
-    const float u = decision.current_A;
-    decision.margins[0] = value_at(&functions[VOLTAGE], u);
-    decision.margins[1] = value_at(&functions[SOC], u);
-    decision.margins[2] = smaller(value_at(&functions[CORE_ABOVE], u),
-                                  value_at(&functions[CORE_BELOW], u));
-    decision.margins[3] = smaller(value_at(&functions[SURFACE_ABOVE], u),
-                                  value_at(&functions[SURFACE_BELOW], u));
+    rcbf_decision_t decision;
+    decision.lower_A = interval.lower_A;
+    decision.upper_A = interval.upper_A;
+    decision.feasible = interval.lower_A <= interval.upper_A;
+    decision.active = decision.feasible ? interval.active : RCBF_INFEASIBLE;
+    const float u = decision.feasible ? interval.lower_A : 0.0f;
+    decision.current_A = u;
+    decision.margins[0] = voltage.constant + u * voltage.linear;
+    decision.margins[1] = soc.constant + u * soc.linear;
+    decision.margins[2] = least_value_at(&robust[0], u);
+    decision.margins[3] = least_value_at(&robust[1], u);
     return decision;
+}
+
+NUMERIC_INLINE float ocv_V(const rcbf_constants_t *constants, uint32_t segment, float soc)
+{
+    const float *at = &constants->ocv_soc[segment];
+    const float *at_V = &constants->ocv_V[segment];
+    const float slope_V = (at_V[1] - at_V[0]) / (at[1] - at[0]);
+    return at_V[0] + slope_V * (soc - at[0]);
+}
+
+NUMERIC_INLINE float within_table(const rcbf_constants_t *constants, float soc)
+{
+    return numeric_clamp(soc, constants->ocv_soc[0],
+                         constants->ocv_soc[constants->ocv_points - 1u]);
 }
 
 float rcbf_open_circuit_voltage_V(const rcbf_constants_t *constants, float soc)
 {
-    const float *table_soc = constants->ocv_soc;
-    const float *table_V = constants->ocv_V;
-    uint32_t below = 0u;
-    uint32_t above = constants->ocv_points - 1u;
-    const float clamped = numeric_clamp(soc, table_soc[below], table_soc[above]);
-    while (above - below > 1u) {
-        const uint32_t middle = (below + above) / 2u;
-        if (clamped > table_soc[middle]) {
-            below = middle;
-        } else {
-            above = middle;
-        }
+    const float clamped = within_table(constants, soc);
+    return ocv_V(constants,
+                 numeric_segment(constants->ocv_soc, constants->ocv_points, clamped), clamped);
+}
+
+float rcbf_open_circuit_voltage_near_V(const rcbf_constants_t *constants, float soc,
+                                       uint8_t *segment)
+{
+    const float clamped = within_table(constants, soc);
+    const float *start = &constants->ocv_soc[*segment];
+    if (!((clamped > start[0]) && (clamped <= start[1]))) {
+        *segment = (uint8_t)numeric_segment(constants->ocv_soc, constants->ocv_points, clamped);
     }
-    const float slope_V =
-        (table_V[above] - table_V[below]) / (table_soc[above] - table_soc[below]);
-    return table_V[below] + slope_V * (clamped - table_soc[below]);
+    return ocv_V(constants, *segment, clamped);
 }
 
 bool rcbf_constants_are_valid(const rcbf_constants_t *k)
@@ -219,7 +311,7 @@ bool rcbf_constants_are_valid(const rcbf_constants_t *k)
                  is_temperature(k->max_core_temperature_K) &&
                  is_temperature(k->max_surface_temperature_K);
     for (uint32_t i = 0u; i < sizeof positive / sizeof positive[0]; i++) {
-        valid = valid && (positive[i] > 0.0f) && (positive[i] <= FLT_MAX);
+        valid = valid && (positive[i] >= LEAST_POSITIVE) && (positive[i] <= FLT_MAX);
     }
     for (uint32_t i = 0u; i < sizeof not_negative / sizeof not_negative[0]; i++) {
         valid = valid && (not_negative[i] >= 0.0f) && (not_negative[i] <= FLT_MAX);

@@ -66,7 +66,7 @@ class FamilyCode:
     def observer(self) -> Any:
         """family_t * that knows nothing."""
         family = self.ffi.new("family_t *")
-        self.lib.family_reset(family)
+        self.lib.family_reset(family, self.k)
         return family
 
     def begin(self, family: Any, told_soc: float, reading: Any) -> None:

@@ -44,6 +44,12 @@ def test_the_map_holds_each_of_its_points(code: FamilyCode) -> None:
             assert code.lib.family_mapped_A(*at) == pytest.approx(largest_A, abs=1e-4)
 
 
+def greatest(code: FamilyCode, table: Any, low: float, high: float) -> float:
+    """Of the cells of a table from one state of charge to another."""
+    cell = code.lib.family_soc_cell
+    return float(code.lib.family_greatest(table, cell(low), cell(high) + 1))
+
+
 @settings(max_examples=200, deadline=None)
 @given(st.sampled_from(TABLES), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_the_greatest_of_a_table_is_that_of_all_cells_that_are_touched(
@@ -52,8 +58,30 @@ def test_the_greatest_of_a_table_is_that_of_all_cells_that_are_touched(
     low, high = np.float32(min(one, other)), np.float32(max(one, other))
     cells = np.array(list(getattr(code.k, name)))
     first, last = (min(int(at * len(cells)), len(cells) - 1) for at in (low, high))
-    greatest = code.lib.family_greatest(getattr(code.k, name), low, high)
-    assert greatest == cells[first : last + 1].max()
+    assert greatest(code, getattr(code.k, name), low, high) == cells[first : last + 1].max()
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.0, 1.0), st.lists(st.tuples(st.floats(-400.0, 5.0), st.integers(1, 30))))
+def test_a_charge_keeps_the_greatest_of_what_its_bounds_span(
+    code: FamilyCode, told_soc: float, parts: list[tuple[float, int]]
+) -> None:
+    family, reading = code.observer(), code.reading()
+    code.observe(family, reading)
+    code.begin(family, told_soc, reading)
+    for current_A, periods in [*parts, (-200.0, 60)]:
+        for _ in range(periods):
+            code.observe(family, code.reading(current_A=current_A, command_A=current_A))
+            if not family.soc_known:
+                return
+            rise = np.float32(code.k.hold_soc_per_A) * np.float32(family.strongest_A)
+            high = np.float32(family.soc_high.soc) + rise
+            for name in TABLES:
+                cells = np.array(list(getattr(code.k, name)))
+                first, last = (
+                    min(int(at * len(cells)), len(cells) - 1) for at in (family.soc_low.soc, high)
+                )
+                assert getattr(family, name) == cells[first : last + 1].max()
 
 
 @settings(max_examples=100, deadline=None)
@@ -69,9 +97,8 @@ def test_slope_and_entropy_of_a_table_are_nowhere_more(
     segment = np.clip(np.searchsorted(cell.ocv.soc, inside, side="right") - 1, 0, len(slopes) - 1)
     entropy = np.interp(inside, cell.entropy.soc, cell.entropy.V_per_K)
     entropy = entropy + interval.entropic_error_V_per_K
-    greatest = code.lib.family_greatest
-    assert greatest(code.k.ocv_slope_V, low, high) >= slopes[segment].max()
-    assert greatest(code.k.entropic_V_per_K, low, high) >= entropy.max()
+    assert greatest(code, code.k.ocv_slope_V, low, high) >= slopes[segment].max()
+    assert greatest(code, code.k.entropic_V_per_K, low, high) >= entropy.max()
 
 
 @settings(max_examples=200, deadline=None)

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from bms.errors import InputError
 from bms.firmware import CompiledNetwork, Firmware
+from bms.firmware._firmware import ffi, lib
 from bms.kan.network import Edge, Network
 from bms.model.model_file import KanModel, load_model, load_shipped_model, shipped_model_path
 from bms.tables import network_tables
@@ -91,6 +92,22 @@ def test_any_shape_that_fits_gives_the_same_in_c(
 def test_what_exceeds_the_maxima_is_refused(width: tuple[int, ...], grid: int) -> None:
     with pytest.raises(InputError, match="exceeds the firmware's"):
         CompiledNetwork(random_model(width, grid, 3, seed=0))
+
+
+@pytest.mark.parametrize(("end", "by"), [(0, 1e-3), (-1, -1e-3)])
+@pytest.mark.parametrize("edge", range(4))
+def test_first_knots_that_inputs_reach_beyond_are_refused(edge: int, end: int, by: float) -> None:
+    block = ffi.new("bms_calibration_t *", lib.host_default_calibration()[0])
+    kan = block.kan
+    assert lib.kan_model_is_valid(ffi.addressof(kan))
+    knots = kan.cells + 1
+    at = edge * knots + (0 if end == 0 else kan.cells)
+    kan.knots[at] += by
+    assert not lib.kan_model_is_valid(ffi.addressof(kan))
+    kan.knots[at] -= 2 * by
+    assert lib.kan_model_is_valid(ffi.addressof(kan))
+    kan.input_reach += 0.01
+    assert not lib.kan_model_is_valid(ffi.addressof(kan))
 
 
 @pytest.mark.parametrize("preset", PRESETS)

@@ -148,6 +148,22 @@ def test_decision_names_the_constraint_that_decides_and_reports_all_margins(
     assert {"none", "soc", "core", "infeasible"} <= seen
 
 
+def test_a_constraint_that_only_just_decides_decides_the_same(firmware: Firmware) -> None:
+    """Where it ends does not depend on the reference, however little that lies beyond."""
+    decided = {"core": 0, "surface": 0}
+    for state in random_states(7, 3_000):
+        decision = solve(firmware, state)
+        if decision.active_constraint not in decided or decision.current_A == 0.0:
+            continue
+        decided[decision.active_constraint] += 1
+        for steps in (1, 2, 5, 20, 100, 500, 5_000):
+            # Single steps of float32 beyond the end.
+            reference_A = np.float32(decision.current_A) * np.float32(1.0 + steps * 2.0**-23)
+            closer = solve(firmware, {**state, "reference_current_A": float(reference_A)})
+            assert closer.current_A == decision.current_A, (state, steps)
+    assert sum(decided.values()) > 100
+
+
 def tight_states(firmware: Firmware, name: str, count: int) -> Iterator[dict[str, float]]:
     """States in which a constraint leaves a few ampere or none at all, where its slope is least."""
     random = np.random.default_rng(5)

@@ -1,5 +1,6 @@
 # Rules of every microcontroller port: boot stage, application and calibration as one image.
-# A port sets TARGET, TARGET_ID and CPU. Run from the repository's root.
+# A port sets TARGET, TARGET_ID and CPU; it may set CORE_FLAGS, and FAST_SOURCES, those of the core
+# that are made for speed. Run from the repository's root.
 BUILD ?= build/firmware/$(TARGET)
 PYTHON ?= .venv/bin/python
 CROSS ?= arm-none-eabi-
@@ -49,7 +50,8 @@ $(BUILD)/sizes.o: $(wildcard $F/include/*.h)
 	@printf '#include "bms.h"\nextern char state[]; char state[sizeof(bms_t)];\n' | \
 	  $(CROSS)gcc $(CFLAGS) -x c -c - -o $@
 
-$(CORE_OBJECTS): CFLAGS += $(WHOLE)
+$(CORE_OBJECTS): CFLAGS += $(WHOLE) $(CORE_FLAGS)
+$(FAST_SOURCES:%=$(BUILD)/application/$F/src/%.o): CFLAGS += -O2
 
 $(BUILD)/application/%.o: %.c $(RULES)
 	@mkdir -p $(@D)
