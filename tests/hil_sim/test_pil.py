@@ -14,8 +14,10 @@ import pytest
 
 from bms.errors import BusError, InputError, ModelMismatchError
 from bms.firmware import Ecu
+from bms.identification.preset_toml import preset_toml
 from bms.model.model_file import load_model, shipped_model_path
 from bms.model.pair import load_pair
+from bms.presets import load_preset
 from hil_sim.bus.catalog import FrameId
 from hil_sim.logs.recorder import Recorder
 from hil_sim.nodes.line_losses import LOSS_ID
@@ -57,6 +59,38 @@ def test_a_full_charge_over_the_serial_line_gives_the_frames_of_the_virtual_bus(
     assert summary.line_losses.total == 0
     other = {"bus": expected.bus, "wall_time_s": expected.wall_time_s, "line_losses": None}
     assert replace(summary, **other) == expected
+
+
+@needs_emulator
+@pytest.mark.parametrize("board", ["mps2-an386", "mps2-an385"])
+def test_a_family_is_charged_with_the_same_frames_where_its_calibration_is_flashed(
+    bms, board, tmp_path
+):
+    """Hot and half full, so that the core's condition governs within the time."""
+    preset, model = load_pair("a123_26650_10C", None)
+    initial = replace(preset.initial, soc=0.5, temperature_K=313.0)
+    path = tmp_path / "hot.toml"
+    path.write_text(preset_toml(replace(preset, name="hot", initial=initial)), encoding="utf-8")
+    bms("export", "--preset", path, "--model", shipped_model_path(preset.name), "--out", tmp_path)
+    flash = (
+        "--image",
+        built(board.replace("-", "_")) / "firmware.bin",
+        "--flash",
+        tmp_path / "flash.bin",
+    )
+    calibration = ("--calibration", tmp_path / "calibration.bin", "--no-start")
+    code, _, err = bms("flash", "--target", f"qemu:{board}", *flash, *calibration)
+    assert (code, err) == (0, "")
+    settings = Settings(load_preset(path), model=model, seed=SEED, max_time_s=60.0)
+    with Recorder(tmp_path / "host.log") as recorder:
+        run = run_both(settings, recorder)
+    assert "core" in {*run.series.active_constraint}
+    with (
+        Emulation(tmp_path / "flash.bin", board) as emulated,
+        Recorder(tmp_path / "board.log") as recorder,
+    ):
+        run_sil(replace(settings, bus=emulated.bus), recorder)
+    assert (tmp_path / "board.log").read_bytes() == (tmp_path / "host.log").read_bytes()
 
 
 @needs_emulator
