@@ -29,7 +29,7 @@ help: ## List the targets
 build: build/extensions ## Build the C extensions anew where their sources have changed
 
 run: build/extensions ## Charge a cell at 10C over a CAN bus and write a report to out/run
-	$(BIN)/bms sil --baseline s-cbf --out $(OUT)
+	$(BIN)/bms sil --mode fastest --baseline s-cbf --baseline kan-rcbf-fixed --out $(OUT)
 
 quick: .venv/tests build/extensions ## Build what changed and run the quick tests of the C core and of Python near it
 	$(PYTEST) -q --dist worksteal -m "not slow" $(or $(TESTS),$(QUICK_TESTS))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Protocol
@@ -65,13 +66,13 @@ def charge_and_report(
     run: Run,
     out: Path | None,
     as_json: bool,
-    baseline: Settings | None = None,
+    baselines: Sequence[Settings] = (),
     log: Path | None = None,
 ) -> int:
-    """Run a charge, and a baseline beside it; print and write what came of it.
+    """Run a charge, and baselines beside it; print and write what came of it.
 
     `log` is one more recording of the controller's bus, in the format of its suffix. Returns the
-    exit code: 1 when the controller, not the baseline, failed its check, or when its time ended
+    exit code: 1 when the controller, not a baseline, failed its check, or when its time ended
     before the charge did. Raises InputError before the run when the folder or the log cannot be
     written.
     """
@@ -87,8 +88,7 @@ def charge_and_report(
                 paths.append(log_folder.path(log.name))
             recorder = during_run.enter_context(Recorder(*paths)) if paths else None
             results = [_followed(settings, run, recorder)]
-        if baseline is not None:
-            results.append(_followed(baseline, run, None))
+        results += [_followed(baseline, run, None) for baseline in baselines]
         if folder is not None:
             write_report(folder, settings, results)
             folder.commit()
@@ -100,12 +100,12 @@ def charge_and_report(
         print_table(Console(), settings, results, out)
     summary = results[0].summary
     if summary.shortfall is not None:
-        print(f"bms: {summary.controller}: {summary.shortfall}; see --max-time-s", file=sys.stderr)
+        print(f"bms: {summary.name}: {summary.shortfall}; see --max-time-s", file=sys.stderr)
     return EXIT_DONE if summary.passed and summary.shortfall is None else EXIT_CHECK_FAILED
 
 
 def _followed(settings: Settings, run: Run, recorder: Recorder | None) -> RunResult:
     """Run, and tell the state of charge meanwhile."""
-    doing = f"{settings.controller.value}, state of charge"
+    doing = f"{settings.name}, state of charge"
     with waiting(doing, completed=settings.preset.initial.soc) as wait:
         return run(settings, recorder, wait.reach)

@@ -14,6 +14,7 @@ from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.bus.buses import is_serial_line
 from hil_sim.commands import charge_mode, options
+from hil_sim.commands.baselines import BaselineOption, baseline_settings
 from hil_sim.commands.outcome import charge_and_report, charge_settings
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.session import run_sil
@@ -26,10 +27,7 @@ def sil(
         ControllerKind,
         typer.Option("--controller", help="kan-rcbf is the C firmware, others Python baselines."),
     ] = ControllerKind.KAN_RCBF,
-    baseline: Annotated[
-        ControllerKind | None,
-        typer.Option("--baseline", help="Run this one too and show it beside the controller."),
-    ] = None,
+    baseline: BaselineOption = None,
     preset: PresetOption = DEFAULT_PRESET,
     model: ModelOption = None,
     bus: options.BusOption = Settings.bus,
@@ -62,27 +60,32 @@ def sil(
     see the bus only. Exit code 1 when the controller lets a limit be crossed, or the charge fails
     or does not end in time.
 
-    Example: bms sil --baseline s-cbf --disturbance bang-bang --out out/run
+    Example: bms sil --mode fastest --baseline s-cbf --baseline kan-rcbf-fixed --out out/run
     """
     with ExitStack() as stack:
         if target is not None:
             if bus != Settings.bus:
                 raise InputError(f"--bus {bus}: --target brings a bus of its own; give one of both")
             bus = stack.enter_context(find_board(target).start()).bus
+        baselines = baseline or []
+        has_firmware = ControllerKind.KAN_RCBF in (
+            controller,
+            *(one.controller for one in baselines),
+        )
         is_remote = is_serial_line(bus)
         if is_remote and controller is not ControllerKind.KAN_RCBF:
             raise InputError(
                 f"--controller {controller.value}: on '{bus}' the ECU at the other end controls; "
                 "leave it out, or name it as --baseline"
             )
-        if model is not None and ControllerKind.KAN_RCBF not in (controller, baseline):
+        if model is not None and not has_firmware:
             raise InputError(
                 f"--model {model}: only {ControllerKind.KAN_RCBF.value} has an estimator; "
                 "leave it out or choose that controller"
             )
         # Of an ECU elsewhere, preset and model are not a choice but what it has to have.
         cell, expected = load_pair(preset, model) if is_remote else (load_preset(preset), model)
-        if not is_remote and ControllerKind.KAN_RCBF in (controller, baseline):
+        if has_firmware and not is_remote:
             load_pair(preset, model)  # refused here, where the preset's file is known
         settings = replace(
             charge_settings(cell, bus, seed, disturbance, faults, max_time_s, realtime, plant),
@@ -91,5 +94,5 @@ def sil(
         )
         settings = charge_mode.with_mode(settings, mode, full_by_s)
         own_bus = Settings.bus if is_remote else bus
-        second = None if baseline is None else replace(settings, controller=baseline, bus=own_bus)
-        return charge_and_report(settings, run_sil, out, as_json, second, log)
+        beside = baseline_settings(settings, baselines, own_bus)
+        return charge_and_report(settings, run_sil, out, as_json, beside, log)

@@ -13,13 +13,27 @@ from bms.presets.schema import Limits
 from hil_sim.run.result import RunResult
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers and in grey.
-CONTROLLER_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
+CONTROLLER_COLOURS = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#E69F00",
+    "#56B4E9",
+    "#F0E442",
+)
 ESTIMATE_COLOUR, LIMIT_COLOUR = "#000000", "#7A1F5C"
 _DPI = 130
+_LEGEND_COLUMNS = 4
 
 
-def charge_chart(limits: Limits, results: Sequence[RunResult]) -> bytes:
-    """PNG with current, voltage, state of charge, surface and core temperature over time."""
+def charge_chart(
+    limits: Limits, results: Sequence[RunResult], bound_s: float | None = None
+) -> bytes:
+    """PNG with current, voltage, state of charge, surface and core temperature over time.
+
+    `bound_s` marks the time before which no controller can be done.
+    """
     figure = Figure(figsize=(9.0, 11.0), layout="constrained")
     panels = figure.subplots(5, 1, sharex=True)
     quantities = (
@@ -41,9 +55,13 @@ def charge_chart(limits: Limits, results: Sequence[RunResult]) -> bytes:
     )
     for axes, (name, label, bound, bound_text) in zip(panels, quantities):
         for result, colour in zip(results, CONTROLLER_COLOURS):
-            _line(axes, result, name, colour, result.summary.controller, width=1.8)
+            _line(axes, result, name, colour, result.summary.name, width=1.8)
         _bound(axes, bound, bound_text.format(bound))
         axes.set_ylabel(label)
+        if bound_s is not None:
+            axes.axvline(bound_s, color=LIMIT_COLOUR, lw=1.1, ls=(0, (5, 2)))
+    if bound_s is not None:
+        _name_bound(panels[2], bound_s)
     for result in results:
         if result.summary.kan_rmse_K is not None:
             _line(
@@ -57,7 +75,15 @@ def charge_chart(limits: Limits, results: Sequence[RunResult]) -> bytes:
             )
     panels[4].set_xlabel("Time since the start of the charge (s)")
     handles, labels = panels[4].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
+    # Every run with an estimate has a line of that name.
+    entries = dict(zip(labels, handles))
+    figure.legend(
+        list(entries.values()),
+        list(entries),
+        loc="outside upper center",
+        ncols=min(len(entries), _LEGEND_COLUMNS),
+        frameon=False,
+    )
     return png(figure)
 
 
@@ -120,6 +146,19 @@ def _bound(axes: Axes, value: float, label: str | None) -> None:
             color=LIMIT_COLOUR,
             fontsize=8.5,
         )
+
+
+def _name_bound(axes: Axes, bound_s: float) -> None:
+    axes.annotate(
+        f"no controller\nis full before\n{bound_s:g} s (physics)",
+        (bound_s, 0.06),
+        xycoords=("data", "axes fraction"),
+        xytext=(-5, 0),
+        textcoords="offset points",
+        ha="right",
+        color=LIMIT_COLOUR,
+        fontsize=8.5,
+    )
 
 
 def png(figure: Figure) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from bms.presets.schema import Limits
@@ -9,12 +10,16 @@ from hil_sim.run.result import CHARGING_STATES, RunResult, Summary
 
 
 class Figure(NamedTuple):
-    """One row: what, one text for each run, the limit as text, and for each run whether kept."""
+    """One row: what, one text for each run, the limit as text, and for each run whether kept.
+
+    `bound` is the least that is possible whatever controls the charge, empty where none is known.
+    """
 
     name: str
     values: list[str]
     limit: str
     kept: list[bool | None]
+    bound: str = ""
 
 
 def figures(limits: Limits, results: list[RunResult]) -> list[Figure]:
@@ -54,7 +59,7 @@ def figures(limits: Limits, results: list[RunResult]) -> list[Figure]:
         values = [_text(getattr(summary, key), pattern) for summary in summaries]
         rows.append(Figure(name, values, "", [None] * len(values)))
         if key == "charge_time_s":
-            rows += _bounds(summaries)
+            rows[-1:] = _with_bounds(rows[-1], summaries)
     potentials_V = [summary.min_anode_potential_V for summary in summaries]
     if any(potential_V is not None for potential_V in potentials_V):
         texts = [_text(potential_V, "{:.4f} V") for potential_V in potentials_V]
@@ -67,9 +72,14 @@ def figures(limits: Limits, results: list[RunResult]) -> list[Figure]:
     return rows
 
 
-def _bounds(summaries: list[Summary]) -> list[Figure]:
-    """How far each charge is from what no controller can beat; no row where nothing is known."""
-    rows = []
+def has_bound(rows: Sequence[Figure]) -> bool:
+    """Whether a table of these rows needs a column for bounds."""
+    return any(row.bound for row in rows)
+
+
+def _with_bounds(time: Figure, summaries: list[Summary]) -> list[Figure]:
+    """The row of the charging times, and how far each is from what no controller can beat."""
+    rows = [time]
     for name, bound, ratio in (
         ("  over the bound of physics", "optimum_time_s", "time_over_optimum"),
         ("  over the bound with ramp and map", "lower_bound_s", "time_over_bound"),
@@ -78,7 +88,9 @@ def _bounds(summaries: list[Summary]) -> list[Figure]:
         known_s = next((bound_s for bound_s in bounds_s if bound_s is not None), None)
         if known_s is not None:
             texts = [_text(getattr(summary, ratio), "{:.3f}") for summary in summaries]
-            rows.append(Figure(name, texts, f"{known_s:.1f} s", [None] * len(texts)))
+            rows.append(Figure(name, texts, "", [None] * len(texts), f"{known_s:.1f} s"))
+    if len(rows) > 1:
+        rows[0] = time._replace(bound=rows[1].bound)
     return rows
 
 

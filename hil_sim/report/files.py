@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 from hil_sim.report.chart import charge_chart, estimate_chart
-from hil_sim.report.figures import figures, seconds_by_constraint
+from hil_sim.report.figures import figures, has_bound, seconds_by_constraint
 from hil_sim.report.folder import OutputFolder
 from hil_sim.report.page import data_url, render_page
 from hil_sim.report.timing import timing_chart, timing_figures
@@ -15,16 +15,23 @@ from hil_sim.run.settings import Settings
 
 
 def summary_json(results: list[RunResult]) -> dict[str, Any]:
-    """Summary of the controller, with that of a baseline under `baseline`."""
-    content = results[0].summary.to_json()
-    if len(results) > 1:
-        content["baseline"] = results[1].summary.to_json()
+    """Summary of the controller, with that of the first baseline under `baseline`.
+
+    Of several baselines, all stand under `baselines`, by the names of their runs.
+    """
+    first, *baselines = (result.summary for result in results)
+    content = first.to_json()
+    if baselines:
+        content["baseline"] = baselines[0].to_json()
+    if len(baselines) > 1:
+        content["baselines"] = {summary.name: summary.to_json() for summary in baselines}
     return content
 
 
 def write_report(folder: OutputFolder, settings: Settings, results: list[RunResult]) -> None:
-    """Write summary, chart and page of a controller and, when there is one, a baseline."""
-    chart = charge_chart(settings.preset.limits, results)
+    """Write summary, chart and page of a controller and the baselines beside it."""
+    bound_s = results[0].summary.optimum_time_s
+    chart = charge_chart(settings.preset.limits, results, bound_s)
     folder.path("charge.png").write_bytes(chart)
     text = json.dumps(summary_json(results), indent=2) + "\n"
     folder.path("summary.json").write_text(text, encoding="utf-8")
@@ -35,6 +42,7 @@ def write_report(folder: OutputFolder, settings: Settings, results: list[RunResu
 def report_page(settings: Settings, results: list[RunResult], chart: bytes) -> str:
     """The self-contained HTML page of a run."""
     preset, first = settings.preset, results[0].summary
+    lines = figures(preset.limits, results)
     has_estimate = first.kan_rmse_K is not None
     return render_page(
         "report.html.j2",
@@ -42,9 +50,10 @@ def report_page(settings: Settings, results: list[RunResult], chart: bytes) -> s
         preset=preset,
         results=results,
         first=first,
-        figures=figures(preset.limits, results),
+        figures=lines,
+        is_bounded=has_bound(lines),
         deciding=[
-            (result.summary.controller, name, time_s)
+            (result.summary.name, name, time_s)
             for result in results
             for name, time_s in seconds_by_constraint(
                 result, preset.timing.sampling_period_s

@@ -13,6 +13,7 @@ from hil_sim.nodes.line_losses import LineLosses
 from hil_sim.nodes.plant import Answer
 from hil_sim.nodes.punctuality import PlantWatch, Timing
 from hil_sim.plant.catalog import DEFAULT_PLANT
+from hil_sim.run.settings import run_name
 
 
 @dataclass
@@ -130,6 +131,11 @@ class Summary:
         """Plain mapping in the order of the fields."""
         content = asdict(self)
         return {**content, "violations": list(self.violations), "faults": list(content["faults"])}
+
+    @property
+    def name(self) -> str:
+        """What tells this run from others beside it, see hil_sim.run.settings.run_name."""
+        return run_name(self.controller, self.mode)
 
     @property
     def failures(self) -> list[str]:

@@ -28,6 +28,11 @@ class ControllerKind(str, Enum):
     MULTI_STAGE = "multi-stage"
 
 
+def run_name(controller: str, mode: str | None) -> str:
+    """What tells a run from others beside it: its controller, and the mode where one is asked."""
+    return controller if mode is None else f"{controller}-{mode}"
+
+
 @dataclass(frozen=True)
 class Settings:
     """What determines a run. The delay is in control periods, the time limit from the edge.
@@ -58,3 +63,15 @@ class Settings:
     """
     plant: str = DEFAULT_PLANT
     """NAME or NAME:ARGUMENT of a plant, see hil_sim.plant.catalog."""
+
+    @property
+    def mode_name(self) -> str | None:
+        """The mode as on the command line; None without, and for a controller that has none."""
+        if self.mode is None or self.controller is not ControllerKind.KAN_RCBF:
+            return None
+        return self.mode.label.replace("_", "-")
+
+    @property
+    def name(self) -> str:
+        """Name of the run, see `run_name`."""
+        return run_name(self.controller.value, self.mode_name)

@@ -81,9 +81,7 @@ def sum_up(
         time_over_optimum=None if bound is None else _over(charge_time_s, bound.optimum_time_s),
         lower_bound_s=None if bound is None else bound.lower_bound_s,
         time_over_bound=None if bound is None else _over(charge_time_s, bound.lower_bound_s),
-        mode=settings.mode.label.replace("_", "-")
-        if settings.mode is not None and is_firmware
-        else None,
+        mode=settings.mode_name,
         full_by_s=settings.full_by_s if is_firmware else None,
     )
     return RunResult(summary, series, watch)
