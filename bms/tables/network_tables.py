@@ -56,6 +56,7 @@ class NetworkTables:
             "width": list(self.width),
             **_memory_fields(network.lags, sampling_period_s),
             **_domain_fields(network),
+            "spans_reach": int(self._spans(network.reach)),
             "input_center": list(network.input_center),
             "input_scale": [1.0 / half for half in network.input_half_range],
             "output_center_K": network.output_center_K,
@@ -63,6 +64,14 @@ class NetworkTables:
             "knots": np.concatenate([edge.knots for edge in self.edges]).tolist(),
             "coefficients": np.concatenate([e.coefficients.ravel() for e in self.edges]).tolist(),
         }
+
+    def _spans(self, reach: float) -> bool:
+        """Whether the first layer's knots span normalised inputs up to the reach, as float32."""
+        from_inputs = self.edges[: self.width[0] * self.width[1]]
+        return all(
+            edge.knots[0] <= -np.float32(reach) and edge.knots[-1] >= np.float32(reach)
+            for edge in from_inputs
+        )
 
 
 def _memory_fields(lags: Lags, sampling_period_s: float) -> dict[str, Any]:

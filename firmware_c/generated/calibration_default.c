@@ -169,6 +169,7 @@ const bms_calibration_t BMS_DEFAULT_CALIBRATION = {
                 .high = 2.54464483f,
             },
         },
+        .spans_reach = 1u,
         .input_center = {
             -11.75f, 0.5f, 302.0f, 298.0f,
         },

@@ -49,6 +49,7 @@ typedef struct {
     uint32_t lags;                      /* how many of the inputs, the last ones, are lagged */
     uint32_t settling_periods;
     uint32_t directions;
+    uint32_t spans_reach; /* 1 where the first layer's knots span what inputs reach */
     kan_lag_t lag[KAN_MAX_LAGS];
     kan_direction_t direction[KAN_MAX_DIRECTIONS];
     float input_center[KAN_MAX_WIDTH];
@@ -66,7 +67,7 @@ typedef struct {
 } kan_estimate_t;
 
 /* True when sizes fit the maxima, all numbers are finite, all knots rise, and those of the first
- * layer span what inputs reach. */
+ * layer span what inputs reach where they are said to. */
 bool kan_model_is_valid(const kan_model_t *model);
 
 /* Edge function number `edge` at x, which is clamped to its knots; beyond them (or for NaN) clears

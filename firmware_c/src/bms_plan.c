@@ -1,15 +1,24 @@
 #include "bms_plan.h"
 
 #include "bms_symptoms.h"
+#include "numeric.h"
 
 /* As soon as possible. */
 #define NO_TIME_LEFT_S (-1.0f)
+/* By which the time that is left may differ from the one that a plan has counted down. */
+#define OTHER_TIME_S 120.0f
 
 bool bms_has_planned_mode(const bms_t *bms)
 {
     const uint8_t mode = bms->measurement.mode;
     return is_valid(bms, CAN_RECEIVED_CHARGE_MODE) &&
            ((mode == MODE_FASTEST) || (mode == MODE_BY_TIME));
+}
+
+static float time_left_s(const bms_t *bms)
+{
+    const codec_measurement_t *m = &bms->measurement;
+    return (m->mode == MODE_BY_TIME) ? m->time_to_full_s : NO_TIME_LEFT_S;
 }
 
 static void describe(const bms_t *bms, planner_start_t *start, planner_goal_t *goal)
@@ -28,17 +37,34 @@ static void describe(const bms_t *bms, planner_start_t *start, planner_goal_t *g
     start->resistance_ohm = calibration->thermal.ohmic_resistance_ohm;
     start->entropic_V = calibration->thermal.entropic_coefficient_V_per_K * core_K;
     if (has_family(bms)) {
-        /* Of the cell at hand no more is known than the hottest core and the greatest heat. */
+        /* Of the cell at hand no more is known than the hottest core, the greatest heat and the
+         * least charge, which is what the end of a charge goes by. Without current the heat says
+         * nothing of the resistance. */
         const float most_A = family->strength_A + calibration->family.current_error_A;
+        const float greatest_ohm = family->resistance_ohm + calibration->family.polarisation_ohm;
+        start->soc = family->soc_low.soc;
         start->temperature_K[0] = -family->core_room_K;
         start->entropic_V = family->entropic_V;
         start->resistance_ohm = (family->heat_W / most_A - family->entropic_V) / most_A;
+        if (start->resistance_ohm > greatest_ohm) {
+            start->resistance_ohm = greatest_ohm;
+        }
     }
     goal->strongest_A = -m->reference_current_A;
     if (goal->strongest_A > -calibration->reference_current_A) {
         goal->strongest_A = -calibration->reference_current_A;
     }
-    goal->time_left_s = (m->mode == MODE_BY_TIME) ? m->time_to_full_s : NO_TIME_LEFT_S;
+    goal->time_left_s = time_left_s(bms);
+}
+
+static bool is_other_goal(const bms_t *bms)
+{
+    const float planned_s = bms->planner.goal.time_left_s;
+    const float asked_s = time_left_s(bms);
+    if ((planned_s < 0.0f) || (asked_s < 0.0f)) {
+        return (planned_s < 0.0f) != (asked_s < 0.0f);
+    }
+    return !(numeric_abs(asked_s - (planned_s - bms->planner.age_s)) <= OTHER_TIME_S);
 }
 
 void bms_plan(bms_t *bms)
@@ -47,6 +73,9 @@ void bms_plan(bms_t *bms)
     if (!is_charging(bms) || !bms_has_planned_mode(bms)) {
         planner_reset(&bms->planner);
         return;
+    }
+    if (is_other_goal(bms)) {
+        planner_reset(&bms->planner);
     }
     if (planner_is_due(&bms->planner)) {
         describe(bms, &bms->planner.start, &bms->planner.goal);

@@ -73,8 +73,9 @@ bool kan_model_is_valid(const kan_model_t *model)
     for (uint32_t edge = 0u; edge < edges; edge++) {
         const float *knots = &model->knots[edge * (model->cells + 1u)];
         valid = valid && numeric_rises(knots, model->cells + 1u) &&
-                ((edge >= from_inputs) || ((knots[0] <= -model->input_reach) &&
-                                     (knots[model->cells] >= model->input_reach)));
+                ((model->spans_reach == 0u) || (edge >= from_inputs) ||
+                 ((knots[0] <= -model->input_reach) &&
+                  (knots[model->cells] >= model->input_reach)));
     }
     return valid && numeric_all_finite(model->coefficients,
                                        edges * model->cells * KAN_CELL_COEFFICIENTS);
@@ -168,9 +169,9 @@ typedef struct {
     uint32_t coefficients;
 } edge_walk_t;
 
-/* Sum of the edges that lead from all nodes to one. The first layer's knots span its nodes. */
+/* Sum of the edges that lead from all nodes to one; nodes that the knots span need no clamping. */
 NUMERIC_INLINE float sum_of_edges(edge_walk_t *walk, const float *nodes, const float *end,
-                                  bool is_first, bool *in_domain)
+                                  bool is_spanned, bool *in_domain)
 {
     const float *knot = walk->knot;
     const float *c = walk->c;
@@ -178,7 +179,7 @@ NUMERIC_INLINE float sum_of_edges(edge_walk_t *walk, const float *nodes, const f
     do {
         float x = *nodes;
         nodes++;
-        if (!is_first) {
+        if (!is_spanned) {
             const float *const last = &knot[1];
             x = clamped(*(last + 1u - walk->knots), *last, x, in_domain);
         }
@@ -213,7 +214,7 @@ kan_estimate_t kan_evaluate(const kan_model_t *model, const float *inputs)
             in_box = false;
         }
     } while (node < end);
-    if (model->width[0] > BLOCK) {
+    if (model->width[0] != BLOCK) {
         while (node < &layers[0][KAN_MAX_WIDTH]) {
             *node = 0.0f;
             node++;
@@ -230,8 +231,9 @@ kan_estimate_t kan_evaluate(const kan_model_t *model, const float *inputs)
                          &model->coefficients[(cells - 1u) * KAN_CELL_COEFFICIENTS], cells + 1u,
                          cells * KAN_CELL_COEFFICIENTS };
     const uint32_t *width = &model->width[1];
+    const bool is_spanned = model->spans_reach != 0u;
     for (uint32_t to = 0u; to < *width; to++) {
-        sums[to] = sum_of_edges(&walk, nodes, end, true, &in_domain);
+        sums[to] = sum_of_edges(&walk, nodes, end, is_spanned, &in_domain);
     }
     for (const uint32_t *last = &model->width[model->layers]; width < last; width++) {
         float *const spent = nodes;

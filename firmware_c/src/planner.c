@@ -21,7 +21,10 @@ enum { CORE, SURFACE, COOLANT, HEAT, COOLING };
 
 bool planner_constants_are_valid(const planner_constants_t *constants)
 {
-    return (constants->step_s > 0.0f) && (constants->step_s <= FLT_MAX) &&
+    return (constants->period_s > 0.0f) && (constants->step_s >= constants->period_s) &&
+           (constants->step_s <= FLT_MAX) && (constants->growth_A > 0.0f) &&
+           (constants->growth_A <= FLT_MAX) && (constants->completion_soc > 0.0f) &&
+           (constants->completion_soc <= FLT_MAX) &&
            numeric_all_finite(constants->response, PLANNER_MASSES * PLANNER_DRIVES);
 }
 
@@ -192,7 +195,7 @@ static void end_prediction(planner_t *planner, float time_s)
         /* The best one is the plan until the next search has ended. */
         planner->is_searching = false;
         planner->planned_A = is_found ? planner->best.strength_A : NAN;
-        planner->time_to_full_s = planner->best.time_s - planner->age_s;
+        planner->time_to_full_s = is_found ? (planner->best.time_s - planner->age_s) : NAN;
     } else if (inner[0].cost < inner[1].cost) {
         planner->high_A = inner[1].strength_A;
         inner[1] = inner[0];

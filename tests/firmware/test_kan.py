@@ -108,6 +108,9 @@ def test_first_knots_that_inputs_reach_beyond_are_refused(edge: int, end: int, b
     assert lib.kan_model_is_valid(ffi.addressof(kan))
     kan.input_reach += 0.01
     assert not lib.kan_model_is_valid(ffi.addressof(kan))
+    # Not where nothing is said of them: then every input is held within its knots.
+    kan.spans_reach = 0
+    assert lib.kan_model_is_valid(ffi.addressof(kan))
 
 
 @pytest.mark.parametrize("preset", PRESETS)

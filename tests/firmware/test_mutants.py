@@ -35,6 +35,7 @@ HISTORY, THERMAL = "tests/firmware/test_history.py", "tests/firmware/test_therma
 FAULTS, ESTIMATE = "tests/firmware/test_ecu_faults.py", "tests/firmware/test_kan.py"
 NETWORK, PROTECTION = "tests/firmware/test_supervision.py", "tests/firmware/test_e2e.py"
 PLANNED = "tests/firmware/test_planner.py"
+PLANNED_FAMILY = "tests/firmware/test_planner_family.py"
 MARGINS = "names_the_constraint"
 
 MUTANTS = [
@@ -88,6 +89,9 @@ MUTANTS = [
     Mutant("in time is better than soon", "planner.c", "(candidate->strength_A + IN_TIME)", "(IN_TIME - candidate->strength_A)", PLANNED, "by_time"),
     Mutant("the fixed mode is not planned", "bms_plan.c", "((mode == MODE_FASTEST) || (mode == MODE_BY_TIME))", "(mode <= MODE_FIXED)", "tests/firmware/test_charge_mode.py", "fixed"),
     Mutant("a mode that is gone is not obeyed", "bms_plan.c", "is_valid(bms, CAN_RECEIVED_CHARGE_MODE) &&", "", PLANNED, "goes_away"),
+    Mutant("a family's plan ends with its least charge", "bms_plan.c", "start->soc = family->soc_low.soc;", "", PLANNED_FAMILY, "full_in_time"),
+    Mutant("heat without current is no resistance", "bms_plan.c", "if (start->resistance_ohm > greatest_ohm)", "if (greatest_ohm < 0.0f)", PLANNED_FAMILY, "pause"),
+    Mutant("another goal is planned at once", "bms_plan.c", "if (is_other_goal(bms))", "if (is_other_goal(bms) && (bms->periods == 0u))", PLANNED_FAMILY, "another_goal"),
 ]  # fmt: skip
 
 
