@@ -180,7 +180,7 @@ def test_the_command_writes_whole_files_that_depend_on_nothing_but_the_seed(tmp_
             for preset in ("paper_calibrated", "lin2014")
         ),
     }
-    for said in ("KAN-rCBF core peak", "multi-stage", "model uncertainty", "lin2014"):
+    for said in ("KAN-rCBF core peak", "multi-stage", "uncertainty", "lin2014"):
         assert said in written.stdout
     page = (tmp_path / "run" / "report.html").read_text()
     assert page.count("data:image/png;base64,") == 6
