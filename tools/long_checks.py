@@ -12,6 +12,7 @@ import hashlib
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -61,6 +62,9 @@ class LongCheck:
     def run(self, root: Path = ROOT) -> bool:
         """Run the command and keep what it says on stdout; False when it fails."""
         before = self.inputs_sha256(root)
+        if "--out" in self.command:
+            # What an earlier run left there is of other inputs.
+            shutil.rmtree(root / self.command[self.command.index("--out") + 1], ignore_errors=True)
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         done = subprocess.run(
             self.command,
