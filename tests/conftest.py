@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable
 from importlib import import_module
@@ -34,6 +35,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Put a variant in the place of the installed extension; refuse extensions of other sources."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        # As a shell does for what it starts in the background; all children would inherit it.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     folder = config.getoption("--firmware-build")
     if folder is not None:
         FIRMWARE.load_build(folder)

@@ -8,6 +8,7 @@ from functools import cache
 
 from hypothesis import strategies as st
 
+from bms.bus_signals import RANGES
 from bms.cell import CellParameters, OpenCircuitVoltage
 from bms.model.model_file import KanModel, load_shipped_model
 from bms.presets import Preset, load_preset
@@ -158,6 +159,7 @@ def plausible_presets(draw: st.DrawFn) -> Preset:
     first = alpha4 * draw(st.floats(0.02, 0.98))
     bound = _between(5e-5, 5e-3)
     own_gain = 1.0 / (cell.core_resistance_K_per_W * core_J_per_K)
+    cooling_W = draw(st.floats(0.2, 1.0)) * cell.ohmic_resistance_ohm * current_A**2
     return Preset(
         "drawn", "", (), cell,
         Limits(
@@ -181,7 +183,7 @@ def plausible_presets(draw: st.DrawFn) -> Preset:
         Initial(0.1, 298.15, 0.0),
         OperatingBox(
             (1.05 * current_A, -0.02 * current_A),
-            (0.0, draw(st.floats(0.2, 1.0)) * cell.ohmic_resistance_ohm * current_A**2),
+            (0.0, min(cooling_W, RANGES.cooling_power_W[1])),
             (coldest_K, surface_K + 3.0),
             (coldest_K - 8.0, surface_K + 1.0),
         ),

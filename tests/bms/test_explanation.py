@@ -260,7 +260,7 @@ def test_command_writes_the_same_files_each_time(bms, tmp_path):
     [
         (["--model", "{model}"], "--out"),
         (["--model", "{tmp}/absent.json", "--out", "{tmp}/o"], "absent.json"),
-        (["--model", "{model}", "--out", "{model}", "--data", "{data}"], "cannot be written"),
+        (["--model", "{model}", "--out", "{model}", "--data", "{data}"], "cannot be made"),
         (["--model", "{model}", "--out", "{tmp}/o", "--data", "{model}"], "column time_s"),
         (["--model", "{model}", "--out", "{tmp}/o", "--preset", "nobody"], "nobody"),
         (["--model", "{model}", "--out", "{tmp}/o", "--preset", "x", "--data", "{data}"], "both"),
