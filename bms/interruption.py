@@ -46,7 +46,9 @@ def prompt_interrupts() -> Iterator[None]:
     finally:
         if signal.getsignal(signal.SIGINT) == watch.interrupt:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        if not watch.is_interrupted:
+        if watch.is_interrupted:
+            _end(_children(), signal.SIGTERM)
+        else:
             signal.set_wakeup_fd(before)
             os.close(writer)
             watch.join()

@@ -114,14 +114,32 @@ import subprocess, sys
 from bms.interruption import prompt_interrupts
 with prompt_interrupts():
     child = subprocess.Popen(["sleep", "60"])
-    print("ready", flush=True)
+    words = iter(["ready"])
     while True:
         try:
+            # Said in here, where the interrupt that answers it is swallowed.
+            for word in words:
+                print(word, flush=True)
             child.wait()
             {body}
         except KeyboardInterrupt:
             print("heard", flush=True)
 """
+UNHANDLED = """
+import subprocess
+from bms.interruption import prompt_interrupts
+try:
+    with prompt_interrupts():
+        child = subprocess.Popen(["sleep", "60"])
+        print("ready", flush=True)
+        child.wait()
+except KeyboardInterrupt:
+    raise SystemExit(130) from None
+"""
+
+
+def child_of(pid):
+    return int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[0])
 
 
 @pytest.mark.parametrize(
@@ -136,11 +154,26 @@ def test_what_does_not_end_by_itself_is_ended_with_its_children(body):
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
-        child = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()[0]
+        child = child_of(process.pid)
         start_s = time.monotonic()
         process.send_signal(signal.SIGINT)
         said = process.communicate(timeout=30.0)
     assert (process.returncode, said) == (130, ("heard\n", "bms: interrupted\n"))
     assert time.monotonic() - start_s < END_S + START_S
     with pytest.raises(ProcessLookupError):
-        os.kill(int(child), 0)
+        os.kill(child, 0)
+
+
+def test_a_process_that_ends_by_itself_leaves_no_child_behind():
+    with subprocess.Popen(
+        [sys.executable, "-c", UNHANDLED], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        child = child_of(process.pid)
+        process.send_signal(signal.SIGINT)
+        # Both ends of a pipe: it is only read to its end when the child has gone too.
+        said = process.communicate(timeout=30.0)
+    assert (process.returncode, said) == (130, ("", ""))
+    with pytest.raises(ProcessLookupError):
+        os.kill(child, 0)
