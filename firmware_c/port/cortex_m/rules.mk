@@ -29,7 +29,7 @@ LDFLAGS := $(CPU) -mthumb -nostartfiles --specs=nano.specs -L$F/linker \
 CORE_SOURCES := $(wildcard $F/src/*.c $F/generated/can_*.c)
 APPLICATION_SOURCES := $(CORE_SOURCES) $F/generated/calibration_default.c $(wildcard $F/port/*.c) \
   $(addprefix $F/port/cortex_m/, startup.c port.c main.c application_header.c calibration_header.c)
-BOOT_SOURCES := $F/src/codec.c $F/src/e2e.c $F/generated/can_catalog.c $F/generated/can_db.c \
+BOOT_SOURCES := $F/src/e2e.c $F/generated/can_catalog.c $F/generated/can_db.c \
   $(wildcard $F/image/*.c $F/boot/*.c) $F/port/slcan.c \
   $(addprefix $F/port/cortex_m/, startup.c boot.c)
 APPLICATION_OBJECTS := $(APPLICATION_SOURCES:%.c=$(BUILD)/application/%.o)
