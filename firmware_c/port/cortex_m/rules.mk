@@ -29,7 +29,7 @@ LDFLAGS := $(CPU) -mthumb -nostartfiles --specs=nano.specs -L$F/linker \
 CORE_SOURCES := $(wildcard $F/src/*.c $F/generated/can_*.c)
 APPLICATION_SOURCES := $(CORE_SOURCES) $F/generated/calibration_default.c $(wildcard $F/port/*.c) \
   $(addprefix $F/port/cortex_m/, startup.c port.c main.c application_header.c calibration_header.c)
-BOOT_SOURCES := $F/src/e2e.c $F/generated/can_catalog.c $F/generated/can_db.c \
+BOOT_SOURCES := $F/src/e2e.c $F/src/kan.c $F/generated/can_catalog.c $F/generated/can_db.c \
   $(wildcard $F/image/*.c $F/boot/*.c) $F/port/slcan.c \
   $(addprefix $F/port/cortex_m/, startup.c boot.c)
 APPLICATION_OBJECTS := $(APPLICATION_SOURCES:%.c=$(BUILD)/application/%.o)
@@ -56,6 +56,17 @@ $(FAST_SOURCES:%=$(BUILD)/application/$F/src/%.o): CFLAGS += -O2
 $(BUILD)/application/%.o: %.c $(RULES)
 	@mkdir -p $(@D)
 	@$(CROSS)gcc $(CFLAGS) -c $< -o $@
+
+# Tables end with the model: what would follow them is cut off, and left to larger models.
+CALIBRATION := $(BUILD)/application/$F/generated/calibration_default.o
+CALIBRATION_SECTION := .rodata.BMS_DEFAULT_CALIBRATION
+
+$(CALIBRATION): $F/generated/calibration_default.c $(RULES)
+	@mkdir -p $(@D)
+	@$(CROSS)gcc $(CFLAGS) -c $< -o $@
+	@$(CROSS)objcopy -O binary -j $(CALIBRATION_SECTION) $@ $(BUILD)/whole_calibration.bin
+	@"$(PYTHON)" -m bms.image calibration $(BUILD)/whole_calibration.bin --out $(BUILD)
+	@$(CROSS)objcopy --update-section $(CALIBRATION_SECTION)=$(BUILD)/calibration.bin $@
 
 $(BUILD)/boot/%.o: %.c $(RULES)
 	@mkdir -p $(@D)
