@@ -140,9 +140,7 @@ def damaged_images(image: bytes) -> dict[str, Damaged]:
             "WRONG_CALIBRATION_LAYOUT",
         ),
         "calibration of another length": Damaged(
-            with_parts(
-                image, resealed(application, calibration_length=longest + 8), calibration
-            ),
+            with_parts(image, resealed(application, calibration_length=longest + 8), calibration),
             "CALIBRATION",
             "WRONG_CALIBRATION_LAYOUT",
         ),

@@ -1,6 +1,5 @@
 # Rules of every microcontroller port: boot stage, application and calibration as one image.
-# A port sets TARGET, TARGET_ID and CPU; it may set CORE_FLAGS, and FAST_SOURCES, those of the core
-# that are made for speed. Run from the repository's root.
+# A port sets TARGET, TARGET_ID and CPU; it may set CORE_FLAGS. Run from the repository's root.
 BUILD ?= build/firmware/$(TARGET)
 PYTHON ?= .venv/bin/python
 CROSS ?= arm-none-eabi-
@@ -51,7 +50,6 @@ $(BUILD)/sizes.o: $(wildcard $F/include/*.h)
 	  $(CROSS)gcc $(CFLAGS) -x c -c - -o $@
 
 $(CORE_OBJECTS): CFLAGS += $(WHOLE) $(CORE_FLAGS)
-$(FAST_SOURCES:%=$(BUILD)/application/$F/src/%.o): CFLAGS += -O2
 
 $(BUILD)/application/%.o: %.c $(RULES)
 	@mkdir -p $(@D)
