@@ -71,6 +71,14 @@ static float within_box(const kan_model_t *model, uint32_t input, float value, f
     return ((value > high) && (value <= high + error)) ? high : value;
 }
 
+static void look_up_voltage(bms_t *bms)
+{
+    if (!has_family(bms)) {
+        bms->open_circuit_voltage_V = rcbf_open_circuit_voltage_near_V(
+            &bms->calibration->rcbf, bms->soc.soc, &bms->ocv_segment);
+    }
+}
+
 static void update_estimates(bms_t *bms)
 {
     const codec_measurement_t *m = &bms->measurement;
@@ -108,6 +116,7 @@ static void update_estimates(bms_t *bms)
         const float commanded_A = is_charging(bms) ? bms->command_A : current_A;
         soc_count(&bms->soc, current_A, commanded_A, calibration->sampling_period_s,
                   calibration->rcbf.capacity_As);
+        look_up_voltage(bms);
     }
 }
 
@@ -128,6 +137,7 @@ static void follow_request(bms_t *bms, uint32_t symptoms)
         }
     } else if ((bms->state == BMS_STANDBY) && bms->may_start && (symptoms == 0u)) {
         soc_set(&bms->soc, bms->measurement.plug_in_soc);
+        look_up_voltage(bms);
         if (has_family(bms)) {
             const family_reading_t reading = reading_of(bms);
             family_begin(&bms->family, &bms->calibration->family, &bms->calibration->rcbf,
@@ -185,7 +195,8 @@ static void decide(bms_t *bms)
             .cooling_power_W = m->cooling_power_W,
             .reference_current_A = wanted_current_A(bms),
         };
-        bms->decision = rcbf_solve(&calibration->rcbf, &input);
+        bms->decision =
+            rcbf_solve_at(&calibration->rcbf, &input, bms->open_circuit_voltage_V);
         bms->state = (bms->decision.active == RCBF_NONE) ? BMS_CHARGING : BMS_DERATED;
     }
 }
