@@ -189,9 +189,9 @@ static void decide(bms_t *bms)
     } else if (is_charging(bms)) {
         const rcbf_input_t input = {
             .soc = bms->soc.soc,
-            .core_temperature_K = { .high_K = bms->estimate.core_temperature_K },
-            .surface_temperature_K = { .high_K = bms->surface_temperature_K },
-            .coolant_temperature_K = { .high_K = m->coolant_temperature_K },
+            .core_temperature_K = { bms->estimate.core_temperature_K, 0.0f },
+            .surface_temperature_K = { bms->surface_temperature_K, 0.0f },
+            .coolant_temperature_K = { m->coolant_temperature_K, 0.0f },
             .cooling_power_W = m->cooling_power_W,
             .reference_current_A = wanted_current_A(bms),
         };
@@ -272,22 +272,22 @@ static void queue_frames(bms_t *bms)
         .planned_A = -bms->planner.planned_A,
         .predicted_time_to_full_s = bms->planner.time_to_full_s,
     };
-    bms->outbox_length = 0u;
-    bms->outbox_next = 0u;
+    can_frame_t *frame = bms->outbox;
     for (uint32_t i = 0u; i < CAN_TRANSMITTED_COUNT; i++) {
         const bool is_due = (bms->periods % CAN_TRANSMITTED[i].every_periods) == 0u;
         if (!is_due || (CAN_TRANSMITTED[i].is_optional && !bms_has_planned_mode(bms))) {
             continue;
         }
-        can_frame_t *frame = &bms->outbox[bms->outbox_length];
         codec_write(i, &report, frame);
         if (CAN_TRANSMITTED[i].is_protected) {
             e2e_protect(frame->data, frame->length, CAN_TRANSMITTED[i].data_ids,
                         bms->counters[i]);
             bms->counters[i]++;
         }
-        bms->outbox_length++;
+        frame++;
     }
+    bms->outbox_length = (uint32_t)(frame - bms->outbox);
+    bms->outbox_next = 0u;
 }
 
 void bms_step(bms_t *bms)

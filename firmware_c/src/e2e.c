@@ -1,5 +1,7 @@
 #include "e2e.h"
 
+#include "numeric.h"
+
 #define CRC8_START 0xFFu
 #define CRC8_FINAL_XOR 0xFFu
 #define COUNTER_MASK 0x0Fu
@@ -70,7 +72,9 @@ static e2e_status_t check_counter(e2e_receiver_t *receiver, uint8_t counter,
         count(&receiver->counts.repeated, 1u);
         return E2E_REPEATED;
     } else if (steps <= max_delta_counter) {
-        count(&receiver->counts.lost, (uint8_t)(steps - 1u));
+        if (steps > 1u) {
+            count(&receiver->counts.lost, (uint8_t)(steps - 1u));
+        }
     } else if (!receiver->has_refused ||
                (steps_between(receiver->refused_counter, counter) != 1u)) {
         receiver->refused_counter = counter;
@@ -119,7 +123,7 @@ static uint8_t with_period(uint8_t history, bool is_set, uint8_t window_periods)
 }
 
 /* Bits of a byte: those of pairs, of fours, and of the whole are added up. */
-static uint32_t periods_in(uint32_t history)
+NUMERIC_INLINE uint32_t periods_in(uint32_t history)
 {
     const uint32_t pairs = history - ((history >> 1u) & 0x55u);
     const uint32_t fours = (pairs & 0x33u) + ((pairs >> 2u) & 0x33u);
