@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from bms.presets.schema import Sensor, Sensors
+
+_BLOCK = 500
+"""Readings whose noise is drawn at once; the numbers are those of one draw a reading."""
 
 
 class Readings(NamedTuple):
@@ -25,10 +29,15 @@ class SensorSuite:
     def __init__(self, sensors: Sensors, rng: np.random.Generator) -> None:
         self._channels: list[Sensor] = [getattr(sensors, name) for name in Readings._fields]
         self._rng = rng
+        self._normals: Iterator[list[float]] = iter(())
 
     def read(self, truth: Readings) -> Readings:
         """Reading of each channel: truth, bias and noise, rounded to the resolution."""
-        normals = self._rng.standard_normal(len(truth)).tolist()
+        normals = next(self._normals, None)
+        if normals is None:
+            block = self._rng.standard_normal((_BLOCK, len(self._channels)))
+            self._normals = iter(block.tolist())
+            normals = next(self._normals)
         return Readings(*map(_reading, self._channels, truth, normals))
 
 

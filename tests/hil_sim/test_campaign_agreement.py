@@ -99,12 +99,12 @@ def test_every_period_is_that_of_the_run_over_the_bus(name, controller, kind, ma
     assert currents_A.tolist() == series.current_A
     assert (charge.outcome, fields.periods) == (summary.stop_reason, summary.steps)
     for peak_K, of_bus_K in (
-        (fields.peaks.core_temperature_K, summary.max_core_temperature_K),
-        (fields.peaks.surface_temperature_K, summary.max_surface_temperature_K),
+        (fields.peaks.cell.core_temperature_K, summary.max_core_temperature_K),
+        (fields.peaks.cell.surface_temperature_K, summary.max_surface_temperature_K),
     ):
         assert peak_K == pytest.approx(of_bus_K, abs=SAME_K, rel=0.0)
-    assert fields.peaks.voltage_V == summary.max_voltage_V
-    assert fields.peaks.soc == summary.max_soc
+    assert fields.peaks.cell.voltage_V == summary.max_voltage_V
+    assert fields.peaks.cell.soc == summary.max_soc
     assert fields.time_s == pytest.approx(series.time_s[-1])
     assert fields.first_derate_s == pytest.approx(summary.first_derate_s or -1.0)
     if controller is ControllerKind.KAN_RCBF:
@@ -142,7 +142,7 @@ def test_a_cell_of_the_family_charges_as_over_the_bus(run, controller):
         true_cell=true_cell,
     )
     result = run_both(settings)
-    summary, series, peaks = result.summary, result.series, charge.fields.peaks
+    summary, series, peaks = result.summary, result.series, charge.fields.peaks.cell
     soc, core_K, surface_K, coolant_K, currents_A = np.transpose(trace)
     assert currents_A.tolist() == series.current_A
     assert min(currents_A) < -5.0

@@ -48,9 +48,10 @@ class TimedBus:
         self.sent = []
         self.answer = lambda frame: None
 
-    def send(self, frame):
-        self.sent.append((self._clock.time_s, frame))
-        self.answer(frame)
+    def send(self, *frames):
+        for frame in frames:
+            self.sent.append((self._clock.time_s, frame))
+            self.answer(frame)
 
     def receive(self, timeout_s):
         end_s = self._clock.time_s + timeout_s

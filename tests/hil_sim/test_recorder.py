@@ -19,7 +19,7 @@ def test_what_is_recorded_is_read_back(tmp_path_factory, entries):
     path = tmp_path_factory.mktemp("log") / "can.log"
     with Recorder(path) as recorder:
         for step, (frame_id, data, received) in enumerate(entries):
-            recorder.record(step * 0.1, Frame(frame_id, data), received)
+            recorder.record(step * 0.1, [Frame(frame_id, data)], received)
     with can.LogReader(path) as reader:
         read = [(m.arbitration_id, bytes(m.data), m.is_rx, m.timestamp) for m in reader]
     assert [entry[:3] for entry in read] == entries
@@ -28,8 +28,8 @@ def test_what_is_recorded_is_read_back(tmp_path_factory, entries):
 
 def test_lines_are_those_of_candump(tmp_path):
     with Recorder(tmp_path / "can.log") as recorder:
-        recorder.record(0.0, Frame(0x080, b""), False)
-        recorder.record(12.3, Frame(0x180, b"\xd4\x19\x89\x37"), True)
+        recorder.record(0.0, [Frame(0x080, b"")], False)
+        recorder.record(12.3, [Frame(0x180, b"\xd4\x19\x89\x37")], True)
     lines = (tmp_path / "can.log").read_text().splitlines()
     assert lines == ["(0.000000) vcan0 080# T", "(12.300000) vcan0 180#D4198937 R"]
     assert all(re.fullmatch(r"\(\d+\.\d{6}\) \S+ [0-9A-F]{3}#[0-9A-F]* [TR]", x) for x in lines)
