@@ -42,7 +42,9 @@ def pytest_configure(config: pytest.Config) -> None:
     folder = config.getoption("--firmware-build")
     if folder is not None:
         FIRMWARE.load_build(folder)
-    for extension in ((RIVALS, NATIVE, RUNNER) if folder is not None else (FIRMWARE, RIVALS, NATIVE, RUNNER)):
+    for extension in (
+        (RIVALS, NATIVE, RUNNER) if folder is not None else (FIRMWARE, RIVALS, NATIVE, RUNNER)
+    ):
         if extension.is_stale(import_module(extension.module)):
             raise pytest.UsageError(
                 f"{extension.module} was built from other C sources than lie here now; "

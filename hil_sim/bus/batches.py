@@ -12,9 +12,10 @@ import os
 import select
 import socket
 import time
+from collections import deque
 from collections.abc import Sequence
 from queue import Empty, SimpleQueue
-from typing import Any, Protocol, cast, runtime_checkable
+from typing import Any, NamedTuple, Protocol, cast, runtime_checkable
 
 import can
 from can.interfaces.socketcan import SocketcanBus
@@ -41,58 +42,81 @@ class BatchBus(Protocol):
 
 
 class VirtualBatchBus(VirtualBus):
-    """The virtual bus with a queue in C; its frames reach all others as messages of python-can."""
+    """The virtual bus with a queue in C.
+
+    Frames of a batch go to others of this class as they are, and to every other party on the
+    channel as messages of python-can.
+    """
 
     def __init__(self, channel: str, **options: Any) -> None:
         super().__init__(channel=channel, **options)
-        messages: Any = SimpleQueue()
+        self._read = deque[can.Message]()
+        messages: Any = _BatchQueue()
         with channels_lock:
             self.channel[self.channel.index(self.queue)] = messages
             self.queue = messages
 
     def send_frames(self, frames: Sequence[Frame]) -> None:
-        """Put frames on the bus in order; each is one message, which all receivers share."""
+        """Put frames on the bus in order."""
         self._check_if_open()
-        now_s, channel = time.time(), self.channel_id
-        own = self.queue
-        others = [queue for queue in self.channel if queue is not own]
-        for frame_id, data in frames:
-            message = _message(frame_id, data, now_s, channel)
-            for queue in others:
-                queue.put(message)
+        batch = _Batch(time.time(), frames)
+        for queue in self.channel:
+            if queue is self.queue:
+                continue
+            if isinstance(queue, _BatchQueue):
+                queue.put(batch)
+            else:
+                for message in batch.messages(self.channel_id):
+                    queue.put(message)
 
     def hear(self, timeout_s: float) -> list[Frame | ForeignFrame]:
         """All that has come; see BatchBus."""
-        if self._filters:
+        if self._filters or self._read:
             message = self.recv(timeout_s)
             return [] if message is None else [heard_of(message)]
         self._check_if_open()
-        messages: SimpleQueue[can.Message] = cast(Any, self.queue)
+        queue: _BatchQueue = cast(Any, self.queue)
         try:
-            heard = [messages.get(timeout=timeout_s)]
-            heard += [messages.get() for _ in range(messages.qsize())]
+            coming = [queue.get(timeout=timeout_s)]
+            coming += [queue.get() for _ in range(queue.qsize())]
         except Empty:
             return []
-        return [heard_of(message) for message in heard]
+        heard: list[Frame | ForeignFrame] = []
+        for one in coming:
+            if isinstance(one, _Batch):
+                heard += one.frames
+            else:
+                heard.append(heard_of(one))
+        return heard
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        """For python-can's recv: one message at a time, of a batch too."""
+        if not self._read:
+            one: Any = super()._recv_internal(timeout)[0]
+            self._read += one.messages(self.channel_id) if isinstance(one, _Batch) else [one]
+        return self._read.popleft(), False
+
+
+class _Batch(NamedTuple):
+    """Frames that were sent at one time."""
+
+    time_s: float
+    frames: Sequence[Frame]
+
+    def messages(self, channel: Any) -> list[can.Message]:
+        return [
+            can.Message(self.time_s, frame_id, is_extended_id=False, channel=channel, data=data)
+            for frame_id, data in self.frames
+        ]
+
+
+class _BatchQueue(SimpleQueue["can.Message | _Batch"]):
+    """Of a bus that takes batches."""
 
 
 def heard_of(message: can.Message) -> Frame | ForeignFrame:
     """A message of python-can as the nodes see it."""
     return foreign_kind(message) or Frame(message.arbitration_id, bytes(message.data))
-
-
-_new_message = can.Message.__new__
-
-
-def _message(frame_id: int, data: bytes, time_s: float, channel: Any) -> can.Message:
-    """A received data frame, without the constructor's checks."""
-    message = _new_message(can.Message)
-    message.timestamp, message.arbitration_id, message.channel = time_s, frame_id, channel
-    message.data, message.dlc = bytearray(data), len(data)
-    message.is_rx = True
-    message.is_extended_id = message.is_remote_frame = message.is_error_frame = False
-    message.is_fd = message.bitrate_switch = message.error_state_indicator = False
-    return message
 
 
 _EXTENDED, _REMOTE, _ERROR = 0x80000000, 0x40000000, 0x20000000
@@ -128,9 +152,7 @@ class SocketcanBatchBus(SocketcanBus):
     def _send_one(self, frame: Frame, error: int) -> None:
         if error not in (0, -errno.EINTR, -errno.ENOSYS):
             raise can.CanOperationError(f"Failed to transmit: {os.strerror(-error)}", -error)
-        self.send(
-            can.Message(arbitration_id=frame.frame_id, data=frame.data, is_extended_id=False)
-        )
+        self.send(can.Message(arbitration_id=frame.frame_id, data=frame.data, is_extended_id=False))
 
     def hear(self, timeout_s: float) -> list[Frame | ForeignFrame]:
         """All that has come; see BatchBus."""

@@ -97,6 +97,24 @@ class CanBus(Closing):
                 return waiting.popleft()
         return None
 
+    def gather(
+        self, last_id: int, is_last: Callable[[Frame], bool], timeout_s: float, most: int
+    ) -> list[Frame]:
+        """Frames up to one of last_id that `is_last`, or what has come within timeout_s.
+
+        Never more than `most`, so that a stream of others ends the wait.
+        """
+        frames, waiting = list[Frame](), self._waiting
+        deadline = Deadline(timeout_s, self._clock_s)
+        while len(frames) < most:
+            frame = waiting.popleft() if waiting else self.receive(deadline.left_s)
+            if frame is None:
+                break
+            frames.append(frame)
+            if frame[0] == last_id and is_last(frame):
+                break
+        return frames
+
     def _hear(self, timeout_s: float) -> list[Frame | ForeignFrame]:
         if self._batches is None:
             heard = next_heard(self.name, self._bus, timeout_s)

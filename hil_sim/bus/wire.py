@@ -11,8 +11,8 @@ import struct
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from hil_sim.bus.frame import Frame
 from hil_sim.bus.database import MessageCodec
+from hil_sim.bus.frame import Frame
 from hil_sim.native._native import ffi, lib
 
 _FRAME = struct.Struct("=IB8s3x")

@@ -42,10 +42,9 @@ class _CandumpLines:
         if self._first_s is None:
             self._first_s = time_s
         time_s = max(time_s, self._first_s)
-        begin, width, end = f"({time_s:f}) {CHANNEL} ", 8 if is_extended else 3, _ENDS[received]
-        self._write(
-            "".join([f"{begin}{i:0{width}X}#{data.hex().upper()}{end}" for i, data in frames])
-        )
+        begin, end = f"({time_s:f}) {CHANNEL} ", _ENDS[received]
+        shown = "%08X#" if is_extended else "%03X#"
+        self._write("".join([begin + shown % i + data.hex().upper() + end for i, data in frames]))
 
 
 _ENDS = {True: " R\n", False: " T\n"}

@@ -26,6 +26,10 @@ _MOST_KEPT_FRAMES = 100
 _SYNC_ID = int(FrameId.SYNC)
 
 
+def _any(frame: Frame) -> bool:
+    return True
+
+
 class EcuLike(Protocol):
     """The firmware, or a baseline in its place."""
 
@@ -64,12 +68,13 @@ class EcuNode:
 
     def answer(self, timeout_s: float) -> bool:
         """Take in frames until a SYNC has been answered; False when timeout_s pass without."""
-        deadline = Deadline(timeout_s)
-        while (frame := self._bus.receive(deadline.left_s)) is not None:
-            if self._take(frame):
-                self._step()
-                return True
-        return False
+        frames = self._bus.gather(_SYNC_ID, _any, timeout_s, _MOST_FRAMES_A_PERIOD)
+        for frame in frames:
+            self._take(frame)
+        if not frames or frames[-1].frame_id != _SYNC_ID:
+            return False
+        self._step()
+        return True
 
     def run(self, silence_s: float, stopped: Callable[[], bool], poll_s: float = 0.1) -> None:
         """Answer every SYNC until `stopped`, or until silence_s without a frame after the first."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
+from typing import NamedTuple
 
 from bms.errors import BusError
 from bms.firmware import Reception, ReceptionCounts
@@ -18,7 +18,7 @@ from hil_sim.bus.fault_bits import FaultBits
 from hil_sim.bus.identity import Identity
 from hil_sim.bus.wire import Decoder, Listener, Publisher
 from hil_sim.logs.recorder import Recorder
-from hil_sim.nodes.turns import MOST_FRAMES, Turn
+from hil_sim.nodes.turns import MOST_FRAMES, StampedFrame, Turn
 from hil_sim.plant.sensors import Readings
 
 CONNECT_ATTEMPTS = 10
@@ -47,13 +47,10 @@ _CONSTRAINTS = {constraint.value: constraint.label for constraint in catalog.Act
 
 Delivery = Callable[[list[Frame]], list[Frame]]
 """Frames that arrive in place of those that were sent."""
-StampedFrame = tuple[float, Frame]
-"""A frame with its time in s."""
 _TIME = itemgetter(0)
 
 
-@dataclass(frozen=True)
-class Request:
+class Request(NamedTuple):
     """What the charger asks for: on or off, the current wanted (A), state of charge at plug-in.
 
     Without a mode the charger leaves the message that asks for one out. The time in which to be
@@ -201,7 +198,7 @@ class PlantNode:
         for attempt in range(CONNECT_ATTEMPTS):
             if attempt == 0 or not is_serial_line(self._bus.name):
                 sent_s, heard = self._publish(period, frames), []
-            listened = self._listen(period)
+            listened = self._turn.answers(self._bus, period, self._is_last)
             heard += listened
             if not self._is_connected:
                 self._note_version([frame for _, frame in listened])
@@ -225,10 +222,6 @@ class PlantNode:
         sent_s = self._turn.time_s(period)
         self._bus.send(*frames)
         return sent_s
-
-    def _listen(self, period: int) -> list[StampedFrame]:
-        answers = self._turn.answers(self._bus, period, self._is_last)
-        return [(self._turn.time_s(period), frame) for frame in answers]
 
     def _is_last(self, frame: Frame) -> bool:
         """Whether it is the charge command that continues from the last one.
