@@ -1,8 +1,8 @@
 """python-can's virtual and SocketCAN buses, which also take and give many frames by one call.
 
 They are buses of python-can like others, and meet those on the same channel. What `hear` and
-`send_frames` leave out is what python-can does for each frame: a lock and copies on the virtual bus,
-two system calls on SocketCAN.
+`send_frames` leave out is what python-can does for each frame: a lock and copies on the virtual
+bus, two system calls on SocketCAN.
 """
 
 from __future__ import annotations

@@ -17,8 +17,22 @@ from hil_sim.bus.batches import BatchBus, SocketcanBatchBus, VirtualBatchBus, he
 from hil_sim.bus.closing import Closing
 from hil_sim.bus.deadline import Deadline
 from hil_sim.bus.foreign import ForeignFrame, is_unreadable
-from hil_sim.bus.frame import Frame as Frame
+from hil_sim.bus.frame import Frame
 from hil_sim.bus.slcan import SCHEME, SlcanSocketBus
+
+__all__ = [
+    "GUEST",
+    "CanBus",
+    "Frame",
+    "ecu_remedy",
+    "is_serial_line",
+    "next_heard",
+    "one_line",
+    "open_bus",
+    "open_interface",
+    "require_room_for_ecu",
+    "require_shared",
+]
 
 GUEST = Path(__file__).with_name("vcan_guest.sh")
 """Runs a command where vcan0 exists, also on a kernel without CAN."""

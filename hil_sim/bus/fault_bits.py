@@ -23,7 +23,7 @@ class FaultBits:
         self._more = dict.fromkeys(FaultPage, 0)
 
     def take(self, value: Callable[[str], float | None]) -> None:
-        """Take what one message or several say, from a function that gives the value of a signal."""
+        """Take what messages say, from a function that gives the value of a signal."""
         more = value("MoreFaults")
         for page in FaultPage if more is not None else ():
             if more is not None and value("FaultPage") == page:

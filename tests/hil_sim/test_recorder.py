@@ -33,3 +33,22 @@ def test_lines_are_those_of_candump(tmp_path):
     lines = (tmp_path / "can.log").read_text().splitlines()
     assert lines == ["(0.000000) vcan0 080# T", "(12.300000) vcan0 180#D4198937 R"]
     assert all(re.fullmatch(r"\(\d+\.\d{6}\) \S+ [0-9A-F]{3}#[0-9A-F]* [TR]", x) for x in lines)
+
+
+@given(entries, st.floats(-1.0, 1e6))
+def test_lines_are_those_that_python_can_writes(tmp_path_factory, entries, begin_s):
+    """A first time below 0 s, and a later one before the first, among them."""
+    folder = tmp_path_factory.mktemp("lines")
+    times_s = [begin_s + step * (0.1 if step % 3 else -0.05) for step in range(len(entries))]
+    with Recorder(folder / "can.log") as recorder:
+        for time_s, (frame_id, data, received) in zip(times_s, entries):
+            recorder.record(time_s, [Frame(frame_id, data)], received)
+    with can.Logger(folder / "python_can.log", channel="vcan0") as logger:
+        for time_s, (frame_id, data, received) in zip(times_s, entries):
+            logger.on_message_received(
+                can.Message(
+                    round(time_s, 6), frame_id, is_extended_id=False, data=data, is_rx=received
+                )
+            )
+    written = [(folder / name).read_bytes() for name in ("can.log", "python_can.log")]
+    assert written[0] == written[1]
