@@ -41,8 +41,7 @@ class _CandumpLines:
         time_s = round(time_s, 6)
         if self._first_s is None:
             self._first_s = time_s or 0.0
-        if time_s < self._first_s:
-            time_s = self._first_s
+        time_s = max(time_s, self._first_s)
         begin, end = f"({time_s:f}) {CHANNEL} ", _ENDS[received]
         shown = "%08X#" if is_extended else "%03X#"
         self._write("".join([begin + shown % i + data.hex().upper() + end for i, data in frames]))
