@@ -179,6 +179,8 @@ class SocketcanBatchBus(SocketcanBus):
 
 def _heard(raw: Any) -> Frame | ForeignFrame:
     frame_id = raw.id
+    if raw.size != lib.SOCKETCAN_CLASSICAL_BYTES:
+        return ForeignFrame.FD
     if not frame_id & _FLAGS:
         return Frame(frame_id, bytes(ffi.buffer(raw.data, raw.length)))
     if frame_id & _ERROR:

@@ -25,6 +25,7 @@ __all__ = [
     "CanBus",
     "Frame",
     "ecu_remedy",
+    "heard_on",
     "is_serial_line",
     "next_heard",
     "one_line",
@@ -130,17 +131,27 @@ class CanBus(Closing):
         return frames
 
     def _hear(self, timeout_s: float) -> list[Frame | ForeignFrame]:
-        if self._batches is None:
-            heard = next_heard(self.name, self._bus, timeout_s)
-            return [] if heard is None else [heard]
-        try:
-            return self._batches.hear(timeout_s)
-        except (can.CanError, OSError) as error:
-            raise BusError(f"bus '{self.name}': cannot receive: {one_line(error)}") from None
+        return heard_on(self.name, self._bus, self._batches, timeout_s)
 
     def close(self) -> None:
         """Close the connection to the bus."""
         self._bus.shutdown()
+
+
+def heard_on(
+    name: str, bus: can.BusABC, batches: BatchBus | None, timeout_s: float
+) -> list[Frame | ForeignFrame]:
+    """What has come from a bus, after a wait of up to timeout_s for the first; empty without any.
+
+    All of it where the bus is one of batches, else one at a time. BusError when the bus fails.
+    """
+    if batches is None:
+        heard = next_heard(name, bus, timeout_s)
+        return [] if heard is None else [heard]
+    try:
+        return batches.hear(timeout_s)
+    except (can.CanError, OSError) as error:
+        raise BusError(f"bus '{name}': cannot receive: {one_line(error)}") from None
 
 
 def next_heard(name: str, bus: can.BusABC, timeout_s: float) -> Frame | ForeignFrame | None:

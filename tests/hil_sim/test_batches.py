@@ -118,8 +118,9 @@ def test_what_waits_on_socketcan_is_heard_at_once_with_its_kinds(pair):
         far.send(raw(*frame))
     for flag in (0x80000000, 0x40000000, 0x20000000):
         far.send(raw(flag | 0x100, b"\x01"))
-    heard = bus.hear(0.0)
-    assert heard == [*FRAMES, ForeignFrame.EXTENDED, ForeignFrame.REMOTE, ForeignFrame.ERROR]
+    far.send((0x100).to_bytes(4, "little") + bytes([64, 0, 0, 0]) + bytes(64))
+    kinds = [ForeignFrame.EXTENDED, ForeignFrame.REMOTE, ForeignFrame.ERROR, ForeignFrame.FD]
+    assert bus.hear(0.0) == [*FRAMES, *kinds]
     assert bus.hear(0.0) == []
     assert bus.hear(0.01) == []
     far.send(raw(0x123))
