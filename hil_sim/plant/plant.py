@@ -126,6 +126,8 @@ class Plant:
             self._knots,
             SUB_STEPS,
             self._peaks,
+            ffi.NULL,
+            ffi.NULL,
         )
         self.state = self._state_now()
 

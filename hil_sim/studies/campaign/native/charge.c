@@ -1,6 +1,7 @@
 #include "charge.h"
 
 #include <math.h>
+#include <stddef.h>
 
 static double larger(double a, double b)
 {
@@ -160,9 +161,9 @@ static charge_outcome_t outcome_of(const charge_t *charge, uint32_t state)
     return (run_s >= scenario->max_time_s) ? CHARGE_TIME_LIMIT : CHARGE_RUNNING;
 }
 
-static void note_model_error(charge_t *charge, double growth)
+static void note_model_error(void *watcher, const cell_state_t *disturbance)
 {
-    const cell_state_t *disturbance = &charge->knot;
+    charge_t *charge = (charge_t *)watcher;
     const charge_differences_t *less = &charge->differences;
     const cell_t *nominal = &charge->scenario->nominal;
     const cell_state_t *state = &charge->memory.state;
@@ -179,7 +180,7 @@ static void note_model_error(charge_t *charge, double growth)
     cell_state_t *error = &peaks->model_error;
     error->soc =
         larger(error->soc, fabs(disturbance->soc + less->soc_per_As * charge->current_A));
-    error->core = larger(error->core, fabs(disturbance->core * growth + heat_K_per_s +
+    error->core = larger(error->core, fabs(disturbance->core + heat_K_per_s +
                                            less->core_gap_per_s * core_gap_K));
     error->surface = larger(error->surface, fabs(surface_K_per_s));
     error->coolant = larger(error->coolant,
@@ -208,17 +209,9 @@ static double core_growth(const charge_t *charge)
 
 static void advance_plant(charge_t *charge, const double *knots)
 {
-    const double growth = core_growth(charge);
-    /* One sub-step after the other only where something looks in between. */
-    const uint32_t pieces = charge->watches_model_error ? CHARGE_SUB_STEPS : 1u;
-    const uint32_t steps = CHARGE_SUB_STEPS / pieces;
-    for (uint32_t i = 0u; i < pieces; i++) {
-        if (charge->watches_model_error) {
-            note_model_error(charge, growth);
-        }
-        cell_hold(&charge->cell, &charge->memory, charge->current_A, charge->cooling_power_W, growth,
-                  &charge->knot, &knots[i * steps * CELL_KNOT_WIDTH], steps, &charge->peaks.cell);
-    }
+    cell_hold(&charge->cell, &charge->memory, charge->current_A, charge->cooling_power_W,
+              core_growth(charge), &charge->knot, knots, CHARGE_SUB_STEPS, &charge->peaks.cell,
+              charge->watches_model_error ? note_model_error : NULL, charge);
 }
 
 /* Current of the coming period, from an answer: as hil_sim/plant/charger.py. */
