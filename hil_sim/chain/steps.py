@@ -5,11 +5,15 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
+from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from bms.commands.identify_surface import identify_surface
+from bms.commands.surface_options import SurfaceOptions
 from bms.errors import InputError
 from bms.image import calibration_part, with_calibration
 from bms.kan.settings import TrainingSettings
@@ -18,6 +22,7 @@ from bms.model.model_file import KanModel, save_model
 from bms.model.pair import load_pair
 from bms.presets import Preset, load_preset
 from bms.presets.authoring.complaints import complaints
+from bms.presets.digest import digest
 from bms.verification import PARTS
 from bms.verification import verify as certify
 from bms.verification.family import FAMILY_PARTS, verify_family
@@ -38,6 +43,8 @@ from hil_sim.run.settings import Settings
 from hil_sim.targets.catalog import DEFAULT_BOARD, find_board
 
 PRESET, MODEL, CERTIFICATE = "preset.toml", "model.json", "verify.json"
+IDENTIFICATION = "identify.txt"
+"""What was fitted how well."""
 _LONGEST_CHARGE = 3.0
 """Of the time that the strongest current would take; the rest of it is an hour."""
 
@@ -106,6 +113,33 @@ def preset_from_file(source: Path) -> Step:
         return Outcome(f"{preset.name}: {preset.cell.capacity_Ah:g} A h", (PRESET,))
 
     return Step("preset", (), f"preset {file_hash(source)}", take)
+
+
+def preset_from_recordings(files: Sequence[Path], chosen: SurfaceOptions) -> Step:
+    """The first step where recordings of a cycler are what there is; `chosen` says how to read.
+
+    Raises InputError for a file that cannot be read.
+    """
+    beside = [path for path in (chosen.check, chosen.entropy) if path is not None]
+    hashes = [file_hash(path) for path in (*files, *beside)]
+
+    def identify(folder: Path) -> Outcome:
+        name = folder.resolve().name
+        said = StringIO()
+        with OutputFolder(folder) as place:
+            with redirect_stdout(said):
+                identify_surface(files, chosen, place.path(f"{name}.toml"), as_json=False)
+            place.path(IDENTIFICATION).write_text(said.getvalue(), encoding="utf-8")
+            place.path(f"{name}.toml").rename(place.path(PRESET))
+            require_no_complaints(place.path(PRESET))
+            place.commit()
+        preset = load_preset(folder / PRESET)
+        lines = said.getvalue().strip().splitlines()
+        checked = f"; {lines[-1]}" if chosen.check is not None else ""
+        text = f"{preset.cell.capacity_Ah:g} A h, from {len(files)} recordings{checked}"
+        return Outcome(text, (PRESET, IDENTIFICATION))
+
+    return Step("identify", (), digest([hashes, repr(chosen)]), identify)
 
 
 def require_no_complaints(path: Path) -> None:

@@ -12,12 +12,20 @@ import typer
 from rich.console import Console
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands import surface_options
+from bms.commands.identify_surface import has_measured_core
 from bms.commands.options import DEFAULT_PROCESSES, JsonOption, out_folder_option, seed_option
 from bms.errors import InputError
 from bms.files import make_folder, write_text
 from bms.presets import preset_path
 from hil_sim.chain.run import Taken, take_all
-from hil_sim.chain.steps import Choices, preset_from_file, steps_after_preset
+from hil_sim.chain.steps import (
+    Choices,
+    Step,
+    preset_from_file,
+    preset_from_recordings,
+    steps_after_preset,
+)
 from hil_sim.commands.options import JobsOption
 from hil_sim.report.page import render_page
 
@@ -25,19 +33,38 @@ REPORT = "report.html"
 
 
 def cell(
+    data: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="[DATA]...", help="Recordings of a cycler, CSV or TXT, for bms identify."
+        ),
+    ] = None,
+    *,
     out: Annotated[Path, out_folder_option("preset, model, report and calibration.bin", None)],
     preset: Annotated[
         str | None,
         typer.Option(
             "--preset",
-            help="Preset to start from: name of a shipped one, or path of a TOML file.",
+            help="Preset to start from in place of recordings: name of a shipped one, or path of "
+            "a TOML file.",
         ),
     ] = None,
+    columns: surface_options.ColumnsOption = None,
+    temperature_unit: surface_options.TemperatureUnitOption = "K",
+    charge_is_positive: surface_options.ChargeSignOption = False,
+    sample_period_s: surface_options.SamplePeriodOption = None,
+    geometry: surface_options.GeometryOption = None,
+    rated: surface_options.RatedOption = None,
+    entropy: surface_options.EntropyOption = None,
+    check: surface_options.CheckOption = None,
     seed: Annotated[int, seed_option("data, training and sensor noise")] = 0,
     jobs: JobsOption = DEFAULT_PROCESSES,
     as_json: JsonOption = False,
 ) -> int:
-    """Make a cell's model, certificate, charge, fault matrix and calibration image from its preset.
+    """Make a cell's preset, model, certificate, charge, fault matrix and calibration from its data.
+
+    DATA are recordings, read and fitted as by 'bms identify', which knows the options too; with
+    --preset there is a preset already.
 
     What is done and unchanged is not done again, so that an interrupted call goes on where it was.
     The first step that fails ends it, with the cause, and exit code 1. Temperatures in K, currents
@@ -46,9 +73,20 @@ def cell(
 
     Example: bms cell --preset my_cell.toml --out my_cell
     """
-    if preset is None:
-        raise InputError("cell: nothing to start from; give --preset FILE")
-    steps = (preset_from_file(preset_path(preset)), *steps_after_preset(Choices(seed, jobs)))
+    chosen = surface_options.SurfaceOptions(
+        tuple(columns or ()),
+        temperature_unit,
+        charge_is_positive,
+        sample_period_s,
+        geometry,
+        tuple(rated or ()),
+        entropy,
+        check,
+        None,
+        None,
+    )
+    first = _first_step(data or [], chosen, preset)
+    steps = (first, *steps_after_preset(Choices(seed, jobs)))
     make_folder(out)
     console = Console(stderr=as_json)
     taken: list[Taken] = []
@@ -66,6 +104,26 @@ def cell(
     else:
         console.print(f"{out / REPORT}: {verdict}", markup=False, highlight=False, soft_wrap=True)
     return EXIT_DONE if _passed(taken, len(steps)) else EXIT_CHECK_FAILED
+
+
+def _first_step(
+    files: Sequence[Path], chosen: surface_options.SurfaceOptions, preset: str | None
+) -> Step:
+    if preset is not None:
+        if files or chosen.is_given:
+            raise InputError(
+                f"--preset {preset}: takes the place of recordings and of what is said of them; "
+                "give one of both"
+            )
+        return preset_from_file(preset_path(preset))
+    if not files:
+        raise InputError("cell: nothing to start from; give recordings, or --preset FILE")
+    if not chosen.is_given and has_measured_core(files[0]):
+        raise InputError(
+            f"{files[0]}: has a measured core or is no recording; identify it with 'bms identify "
+            "--data CSV --preset PRESET --out FILE', then go on with --preset"
+        )
+    return preset_from_recordings(files, chosen)
 
 
 def _passed(taken: Sequence[Taken], steps: int) -> bool:
