@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -13,12 +14,14 @@ from bms.model.model_file import load_shipped_model
 from bms.model.pair import load_pair
 from bms.presets import load_preset, preset_path
 from bms.verification import verify
+from bms.verification.family import verify_family
 from hil_sim.chain import steps
 from hil_sim.chain.run import take_all
 from hil_sim.chain.state import STATE_FILE, State, load_state
 from hil_sim.chain.steps import Outcome, Step
 from hil_sim.fault_matrix.matrix import load_matrix
 from hil_sim.targets.catalog import find_board
+from tests.cycler_recordings import write_cycler
 from tests.firmware.ports import built, needs_emulator
 
 STEPS = ["preset", "train", "verify", "charge", "faults", "export", "image"]
@@ -260,3 +263,80 @@ def test_the_calibration_charges_on_the_emulated_board(bms, quick, tmp_path, mon
     assert "frame by frame as on this computer" in taken["image"]["said"]
     logs = [(tmp_path / "out" / where / "can.log").read_bytes() for where in ("charge", "image")]
     assert logs[0] == logs[1]
+
+
+SIGNS = ("--temperature-unit", "degC", "--charge-positive")
+COLUMNS = ("--columns", "time=0,current=1,voltage=2,surface=3,ambient=4")
+RATED = (
+    "--geometry", "26650", "--rated", "max_charge_A=9.2", "--rated", "max_voltage_V=3.6",
+    "--rated", "charge_temperature_degC=0..50",
+)  # fmt: skip
+CELL = load_preset("lin2014").cell
+
+
+def pulses_A(time_s: float) -> float:
+    """A pulse of 40 s in 400 s, and a short one that charges."""
+    within_s = time_s % 400.0
+    return 2.0 * CELL.capacity_Ah if within_s < 40.0 else -1.0 if 200.0 <= within_s < 210.0 else 0.0
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory):
+    """Slow discharge, a fast one, pulses: files without a header, of the project's own cell."""
+    folder, hour_A = tmp_path_factory.mktemp("cycler"), CELL.capacity_Ah
+    return [
+        write_cycler(folder / "slow.csv", CELL, lambda time_s: hour_A / 10.0, 20.0, seed=1),
+        write_cycler(folder / "fast.csv", CELL, lambda time_s: 3.0 * hour_A, 1.0, seed=2),
+        write_cycler(folder / "pulses.csv", CELL, pulses_A, 1.0, seed=3),
+    ]
+
+
+@pytest.mark.slow
+def test_from_recordings_to_a_calibration(bms, quick, recordings, tmp_path, monkeypatch):
+    def family_model(preset, settings, progress):
+        model = load_shipped_model("a123_26650")
+        return replace(model, preset=preset.name, training_hash=preset.training_hash)
+
+    few = functools.partial(verify_family, samples=200)
+    monkeypatch.setattr(steps, "model_for_preset", family_model)
+    monkeypatch.setattr(steps, "verify_family", few)
+    out = tmp_path / "my cell"
+
+    code, taken, _ = call(bms, *recordings, *COLUMNS, *SIGNS, *RATED, "--out", out)
+
+    assert code == 0, taken
+    assert list(taken) == ["identify", *STEPS[1:]]
+    preset = load_preset(out / "preset.toml")
+    assert preset.name == "my cell"
+    assert preset.limits.reference_current_A == -9.2
+    interval = preset.cell.interval
+    assert interval is not None
+    low, high = (preset.cell.capacity_Ah * factor for factor in interval.capacity)
+    assert low < CELL.capacity_Ah < high
+    assert (out / "calibration.bin").is_file()
+    assert "fast.csv" in (out / "identify.txt").read_text()
+    # The same again is nothing to do; a recording with one more row is another one.
+    _, taken, _ = call(bms, *recordings, *COLUMNS, *SIGNS, *RATED, "--out", out)
+    assert [name for name, one in taken.items() if not one["kept"]] == ["image"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((*COLUMNS, "--charge-positive", *RATED), "likely degrees Celsius"),
+        ((*COLUMNS, "--temperature-unit", "degC", *RATED), "current_A"),
+        (("--columns", "time=0,current=1,voltage=4,surface=3", *SIGNS, *RATED), "voltage"),
+        (("--columns", "time=0,current=1,voltage=9", *SIGNS, *RATED), "9"),
+        ((*SIGNS, *RATED), "columns"),
+        ((*COLUMNS, *SIGNS, "--geometry", "26650", "--rated", "max_charge=4"), "max_charge"),
+        ((*COLUMNS, *SIGNS, *RATED, "--preset", "lin2014"), "give one of both"),
+    ],
+)
+def test_wrong_inputs_are_refused_at_once_with_their_cause(
+    bms, quick, recordings, tmp_path, words, said
+):
+    code, taken, err = call(bms, *recordings, *words, "--out", tmp_path / "out")
+    assert (code, taken, err.count("\n")) == (2, {}, 1), err
+    assert said in err
+    assert quick == []
+    assert not (tmp_path / "out" / "preset.toml").exists()
