@@ -81,7 +81,8 @@ def identify(
 ) -> int:
     """Fit a cell to recordings: its thermal part with a measured core, all of it without one.
 
-    With a measured core (column core_temperature_K), the thermal parameters. The first two thirds of the recording are fitted, the last third is simulated on and compared.
+    With a measured core (column core_temperature_K), the thermal parameters. The first two thirds
+    of the recording are fitted, the last third is simulated on and compared.
     Temperatures fix ratios only: the core's heat capacity (J/K) is the preset's and sets the scale.
     A parameter that the data do not tell, or only at the bound of the search, is named with the
     reason; then no preset is written and the exit code is 1.
@@ -95,9 +96,7 @@ def identify(
     voltage and capacity, resistances, heat capacity, cooling, dU/dT, with intervals; limits are
     those of --rated, else what the recordings have shown. Every number's source stands beside it.
 
-    Examples: bms identify --data cycle.csv --preset lin2014 --out my_cell.toml; bms identify --data
-    slow.csv pulses.csv --columns time=0,current=1,voltage=2,surface=4,ambient=6 --temperature-unit
-    degC --charge-positive --geometry 18650 --rated max_charge_A=4 --out my_cell.toml
+    Example: bms identify --data cycle.csv --preset lin2014 --out my_cell.toml
     """
     files = [*(data or []), *(more or [])]
     if not files:

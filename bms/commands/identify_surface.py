@@ -20,6 +20,7 @@ from bms.errors import InputError
 from bms.files import write_text
 from bms.identification.cell_identification import PARTS, IdentifiedCell, identify_cell
 from bms.identification.cell_preset import CellPreset, cell_preset
+from bms.identification.fit_report import write_report
 from bms.identification.geometry import Shape, shape, shape_of_capacity
 from bms.identification.preset_check import PresetCheck, check_preset
 from bms.identification.preset_toml import preset_toml
@@ -61,6 +62,8 @@ def identify_surface(
     if out is not None:
         write_text(out, preset_toml(found.preset, found.notes))
     checked = None if unused is None else check_preset(found.preset, unused)
+    if chosen.report is not None:
+        write_report(cell, found, unused, checked, chosen.report)
     if as_json:
         typer.echo(json.dumps(_content(cell, found, checked), indent=1))
     else:
@@ -100,7 +103,7 @@ def _entropic(path: Path) -> Array:
         raise InputError(f"{path}: needs two columns, soc rising from 0 to 1 and V_per_K")
     if np.max(np.abs(pairs[:, 1])) > 0.01 or not -0.01 <= pairs[0, 0] <= pairs[-1, 0] <= 1.01:
         raise InputError(f"{path}: soc from 0 to 1 and dU/dT in V/K; likely mV/K or percent")
-    return np.interp(ENTROPY_SOC, pairs[:, 0], pairs[:, 1])
+    return np.asarray(np.interp(ENTROPY_SOC, pairs[:, 0], pairs[:, 1]))
 
 
 def _content(

@@ -153,7 +153,10 @@ def _mean_curve(curves: Sequence[Curve]) -> Curve:
 def tie(
     recording: CyclerRecording, capacity_Ah: float, curve: Curve, *, is_slow: bool
 ) -> tuple[Array, float]:
-    """State of charge (N,) of one recording, and its specimen's capacity in Ah; a slow one spans 0 to 1."""
+    """State of charge (N,) of one recording, and its specimen's capacity in Ah.
+
+    A slow one spans 0 to 1.
+    """
     out_Ah = recording.charge_out_As / 3600.0
     if is_slow:
         own_Ah = float(np.ptp(out_Ah))

@@ -151,29 +151,39 @@ def _resistance(
     notes["resistance"] = (
         f"{steps}; times {life:g} at the end of life ({rated.sources['life_resistance']})"
     )
-    factors["polarisation"] = (0.0, _up(max(_polarisation_factor(cell, records), 1.0) * life))
+    factors["polarisation"] = (
+        0.0,
+        _up(max(_polarisation_factor(cell, records, max(high, 1.0)), 1.0) * life),
+    )
     notes["polarisation"] = (
         f"fitted: what covers 99 % of the rows from SoC 0.1 to 0.95; times {life:g}; "
         "none at the least"
     )
     longest_s = max((branch.time_constant_s for branch in fit.branches), default=60.0)
-    factors["longest_relaxation_s"] = min(3600.0, 1.5 * longest_s)
+    factors["longest_relaxation_s"] = min(3600.0, _up(1.5 * longest_s))
     notes["longest_relaxation_s"] = "fitted: the longest branch, times 1.5 assumed"
     return least_ohm
 
 
-def _polarisation_factor(cell: IdentifiedCell, records: Sequence[Any]) -> float:
-    """Factor on the branches with which the measured overpotential is reached in 99 % of rows."""
+def _polarisation_factor(
+    cell: IdentifiedCell, records: Sequence[Any], ohmic_factor: float
+) -> float:
+    """Factor on the branches with which 99 % of the measured overpotentials are reached.
+
+    Beside the greatest ohmic resistance that steps have shown, and where the branches have come to
+    half of their steady voltage.
+    """
+    steady_ohm = sum(branch.resistance_ohm for branch in cell.electrical.branches)
     fit, factors = cell.electrical, []
     for record in records:
         offset_V = rest_offset_V(fit, record, cell.alignment.capacity_Ah)
         ohmic_V = -record.current_A * fit.resistance_ohm(record.core_K, record.soc)
         branches_V = model_voltage_V(fit, record) - fit.ocv(record.soc) - ohmic_V
-        measured_V = record.voltage_V - fit.ocv(record.soc) - offset_V - ohmic_V
+        measured_V = record.voltage_V - fit.ocv(record.soc) - offset_V - ohmic_factor * ohmic_V
         rows = (
             (record.soc > 0.1)
             & (record.soc < 0.95)
-            & (np.abs(branches_V) > 0.01)
+            & (np.abs(branches_V) > 0.5 * steady_ohm * np.abs(record.current_A))
             & (np.abs(record.current_A) > 0.1 * cell.alignment.capacity_Ah)
         )
         factors += (measured_V[rows] / branches_V[rows]).tolist()

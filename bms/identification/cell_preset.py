@@ -312,8 +312,8 @@ def _plug_in(cell: IdentifiedCell, parameters: CellParameters, notes: dict[str, 
 
 def _map(rated: RatedLimits, notes: dict[str, str]) -> CurrentMap:
     notes["current_map.largest_A"] = (
-        "assumed: a tenth at the cold end of the range, four tenths 10 K above, all from 20 K above "
-        "on, against plating"
+        "assumed: a tenth at the cold end of the range, four tenths 10 K above, all from 20 K "
+        "above on, against plating"
     )
     strongest_A, low_K = rated.max_charge_A, rated.coldest_K
     shares = (0.1, 0.4, 1.0)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import nnls
 
-from bms.arrays import Array
+from bms.arrays import Array, IntArray
 from bms.cell import OpenCircuitVoltage
 from bms.cell.tables import Branch
 from bms.identification.pieces import bends, bounded_fit, hats, relaxed
@@ -21,7 +21,7 @@ OCV_POINTS = np.array(
 )
 RESISTANCE_SOC = np.array([0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0])
 _TIME_CONSTANTS_S = np.geomspace(4.0, 1200.0, 15)
-ACTIVATIONS_K = np.array([0.0, 250.0, 500.0, 750.0, 1000.0, 1400.0, 1800.0, 2300.0, 3000.0, 4000.0])
+ACTIVATIONS_K = np.array([0.0, 300.0, 600.0, 900.0, 1200.0, 1600.0, 2000.0, 2500.0])
 """Activation energies of the resistance over the gas constant."""
 REFERENCE_K = 298.15
 _LARGEST_BRANCHES = 3
@@ -35,6 +35,8 @@ _OCV_STIFFNESS, _RESISTANCE_STIFFNESS = 0.3, 400.0
 _REST_SHARE, _LONG_REST_S = 0.02, 500.0
 _ROUNDS = 3
 _OTHER_SPECIMEN = 0.25
+_STEP_SHARE = 0.6
+"""Of the resistance of steps, which the ohmic one is not below."""
 _MODEL_ERROR_V = 2e-3
 _ROWS_EACH = 3000.0
 _STEP = 0.15
@@ -185,7 +187,7 @@ def _weights(record: ElectricalRecord, capacity_Ah: float) -> Array:
     return np.asarray(weight * np.sqrt(counts * share * _ROWS_EACH))
 
 
-def step_rows(record: ElectricalRecord, capacity_Ah: float) -> Array:
+def step_rows(record: ElectricalRecord, capacity_Ah: float) -> IntArray:
     """Rows at which the current has changed by 0.15 C or more within 5 s."""
     change = np.abs(np.diff(record.current_A)) > _STEP * capacity_Ah
     return np.flatnonzero(change & (np.diff(record.time_s) < _EARLY_S)) + 1
@@ -240,16 +242,14 @@ def _fit_overpotential(
     for activation_K in activations_K.tolist():
         ohmic = soc * (drive * growth(activation_K, core_K))[:, None]
         columns = np.concatenate([ohmic, stiff])
-        chosen, cost = _time_constants(columns, values, lagged)
-        tried.append((cost, activation_K, chosen, columns))
-    _, activation_K, chosen, columns = min(tried, key=lambda one: one[0])
-    count = len(RESISTANCE_SOC) + len(chosen)
-    found = bounded_fit(
-        np.hstack([columns, lagged[:, list(chosen)]]),
-        values,
-        np.full(count, _LEAST_OHM),
-        np.full(count, _MOST_OHM),
-    )
+        chosen, _ = _time_constants(columns, values, lagged)
+        together = np.hstack([columns, lagged[:, list(chosen)]])
+        low = np.full(together.shape[1], _LEAST_OHM)
+        low[: len(RESISTANCE_SOC)] = _least_ohm(records, activation_K, capacity_Ah)
+        solution = bounded_fit(together, values, low, np.full(len(low), _MOST_OHM))
+        left = values - together @ solution
+        tried.append((float(left @ left), activation_K, chosen, solution))
+    _, activation_K, chosen, found = min(tried, key=lambda one: one[0])
     states = len(RESISTANCE_SOC)
     return replace(
         fit,
@@ -262,6 +262,19 @@ def _fit_overpotential(
     )
 
 
+def _least_ohm(
+    records: Sequence[ElectricalRecord], activation_K: float, capacity_Ah: float
+) -> float:
+    """Share of the middle step resistance, brought to the reference temperature."""
+    ohm = [
+        step_ohm(record, capacity_Ah)
+        / growth(activation_K, record.core_K[step_rows(record, capacity_Ah)])
+        for record in records
+    ]
+    steps = np.concatenate(ohm)
+    return max(_LEAST_OHM, _STEP_SHARE * float(np.median(steps)) if len(steps) else 0.0)
+
+
 def _rises(soc: Array) -> Array:
     """Columns (N, P) of the first voltage and of the rises between the points."""
     return np.cumsum(hats(OCV_POINTS, soc)[:, ::-1], axis=1)[:, ::-1]
@@ -272,7 +285,7 @@ def _time_constants(fixed: Array, target: Array, slow: Array) -> tuple[tuple[int
     basis, _ = np.linalg.qr(fixed)
     lags = slow - basis @ (basis.T @ slow)
     left = target - basis @ (basis.T @ target)
-    reduced = np.linalg.qr(np.column_stack([lags, left]), mode="r")
+    reduced = np.asarray(np.linalg.qr(np.column_stack([lags, left]), mode="r"))
     best: tuple[int, ...] = ()
     cost = float(left @ left)
     for count in range(1, _LARGEST_BRANCHES + 1):

@@ -38,7 +38,7 @@ def bends(points: Array) -> Array:
 
 def bounded_fit(columns: Array, values: Array, low: Array, high: Array) -> Array:
     """Least squares of values (N,) by columns (N, P) within bounds (P,), by way of QR."""
-    reduced = np.linalg.qr(np.column_stack([columns, values]), mode="r")
+    reduced = np.asarray(np.linalg.qr(np.column_stack([columns, values]), mode="r"))
     # Columns of very different size are brought to one.
     scale = np.maximum(np.linalg.norm(reduced[:, :-1], axis=0), 1e-12)
     fit = lsq_linear(

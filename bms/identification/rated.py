@@ -1,4 +1,4 @@
-"""Rated limits of a cell: of its data sheet where they are given, else what recordings have shown."""
+"""Rated limits of a cell: of its data sheet, else what recordings have shown."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def _sustained_charge_A(recording: CyclerRecording) -> float:
         return 0.0
     span_s = recording.time_s[later[rows]] - recording.time_s[rows]
     mean_A = (charged_As[later[rows]] - charged_As[rows]) / span_s
-    strongest_A = float(mean_A.max())
+    strongest_A = float(np.max(mean_A))
     noise_A = 0.01 * float(np.max(np.abs(recording.current_A)))
     return strongest_A if strongest_A > noise_A else 0.0
 
@@ -128,4 +128,4 @@ def _sustained_charge_A(recording: CyclerRecording) -> float:
 def _floor(value: float) -> float:
     """Three significant figures, rounded down."""
     digits = 2 - math.floor(math.log10(value))
-    return math.floor(value * 10**digits) / 10**digits
+    return float(math.floor(value * 10.0**digits) / 10.0**digits)

@@ -140,7 +140,9 @@ def fit_thermal(
             smooth = bends(ENTROPY_SOC) / _ENTROPIC_BEND_V_PER_K
             columns = np.concatenate([columns, prior, smooth])
             missing = np.concatenate([missing, np.zeros(len(prior) + len(smooth))])
-            entropic = np.linalg.lstsq(columns, missing, rcond=None)[0]
+            entropic = np.asarray(
+                np.linalg.lstsq(columns, missing, rcond=None)[0], dtype=np.float64
+            )
         return entropic, missing - columns @ entropic, columns
 
     start = np.array([math.log(start_J_per_K), math.log(5.0 * 60.0 / start_J_per_K)])
