@@ -43,8 +43,8 @@ from hil_sim.run.settings import Settings
 from hil_sim.targets.catalog import DEFAULT_BOARD, find_board
 
 PRESET, MODEL, CERTIFICATE = "preset.toml", "model.json", "verify.json"
-IDENTIFICATION = "identify.txt"
-"""What was fitted how well."""
+IDENTIFICATION, FITS = "identify.txt", "identify"
+"""What was fitted how well; the folder has a page with the fits."""
 _LONGEST_CHARGE = 3.0
 """Of the time that the strongest current would take; the rest of it is an hour."""
 
@@ -124,20 +124,22 @@ def preset_from_recordings(files: Sequence[Path], chosen: SurfaceOptions) -> Ste
     hashes = [file_hash(path) for path in (*files, *beside)]
 
     def identify(folder: Path) -> Outcome:
-        name = folder.resolve().name
-        said = StringIO()
-        with OutputFolder(folder) as place:
+        name, said = folder.resolve().name, StringIO()
+        with OutputFolder(folder) as place, OutputFolder(folder / FITS) as page:
+            own = replace(chosen, report=page.path("page").parent)
             with redirect_stdout(said):
-                identify_surface(files, chosen, place.path(f"{name}.toml"), as_json=False)
+                identify_surface(files, own, place.path(f"{name}.toml"), as_json=False)
             place.path(IDENTIFICATION).write_text(said.getvalue(), encoding="utf-8")
             place.path(f"{name}.toml").rename(place.path(PRESET))
             require_no_complaints(place.path(PRESET))
+            fits = sorted(path.name for path in page.path("page").parent.iterdir())
+            page.commit()
             place.commit()
         preset = load_preset(folder / PRESET)
         lines = said.getvalue().strip().splitlines()
         checked = f"; {lines[-1]}" if chosen.check is not None else ""
         text = f"{preset.cell.capacity_Ah:g} A h, from {len(files)} recordings{checked}"
-        return Outcome(text, (PRESET, IDENTIFICATION))
+        return Outcome(text, (PRESET, IDENTIFICATION, *(f"{FITS}/{name}" for name in fits)))
 
     return Step("identify", (), digest([hashes, repr(chosen)]), identify)
 
