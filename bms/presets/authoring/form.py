@@ -21,7 +21,7 @@ _USUAL = {
 _HEAD = """
 A preset to fill in: "" stands for a number or a text, [] for a list. Currents are negative while
 charging, temperatures are in kelvin, state of charge is from 0 to 1. What stands behind a # may be
-left out. 'bms preset check' says what is missing or wrong, and why.
+left out. 'bms preset check PRESET' says what is missing or wrong, and why.
 """
 
 
