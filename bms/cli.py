@@ -6,10 +6,11 @@ import ast
 import logging
 import os
 import sys
+from collections.abc import Callable
 from importlib.abc import InspectLoader
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
-from typing import Any
+from typing import Any, TypeVar
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -21,6 +22,20 @@ from bms.interruption import EXIT_INTERRUPTED, INTERRUPTED, prompt_interrupts
 from bms.plain_text import write_plainly
 
 EXIT_DONE, EXIT_CHECK_FAILED, EXIT_WRONG_USE = 0, 1, 2
+
+
+_SUBCOMMANDS = "subcommands"
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def with_subcommands(*subcommands: Callable[..., Any]) -> Callable[[Function], Function]:
+    """Decorator of a command that has commands of its own, by the names of their functions."""
+
+    def mark(function: Function) -> Function:
+        setattr(function, _SUBCOMMANDS, subcommands)
+        return function
+
+    return mark
 
 
 class _LazyCommand(TyperCommand):
@@ -35,9 +50,16 @@ class _LazyCommand(TyperCommand):
 
     def make_context(self, *arguments: Any, **extra: Any) -> Any:
         """Context of the imported command, which then takes the place of this one."""
-        app = _typer()
-        app.command(name=self.name)(self._entry.load())
-        return get_command(app).make_context(*arguments, **extra)
+        function = self._entry.load()
+        subcommands = getattr(function, _SUBCOMMANDS, ())
+        app = _typer(no_args_is_help=True) if subcommands else _typer()
+        if not subcommands:
+            app.command(name=self.name)(function)
+            return get_command(app).make_context(*arguments, **extra)
+        app.callback()(function)
+        for subcommand in subcommands:
+            app.command()(subcommand)
+        return get_group(app).make_context(*arguments, **extra)
 
 
 def docstring(entry: EntryPoint) -> str:

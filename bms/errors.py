@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class BmsError(Exception):
     """Base of every error of this project that a user can act on."""
@@ -9,6 +11,20 @@ class BmsError(Exception):
 
 class InputError(BmsError, ValueError):
     """A file, option or value that cannot be used; the message says what, where and the remedy."""
+
+
+class ManyInputError(InputError):
+    """Several complaints about one input, each what, where and remedy; as text, the first."""
+
+    def __init__(self, complaints: tuple[str, ...]) -> None:
+        super().__init__(complaints[0])
+        self.complaints = complaints
+
+
+def refuse(complaints: Iterable[str]) -> None:
+    """Raise ManyInputError of the complaints, if there are any."""
+    if found := tuple(complaints):
+        raise ManyInputError(found)
 
 
 class ModelMismatchError(InputError):

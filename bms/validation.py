@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from annotated_types import Ge, Gt, Lt
 from pydantic import AllowInfNan, ConfigDict, TypeAdapter, ValidationError
 
-from bms.errors import InputError
+from bms.errors import InputError, ManyInputError
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -35,13 +36,55 @@ def strict(cls: type[T]) -> type[T]:
 def parse(kind: type[T], content: Any, where: str) -> T:
     """Object of a dataclass from decoded TOML or JSON; InputError names the first wrong key."""
     try:
-        # A TOML date is no JSON value; as text it is refused where a number is wanted.
-        return TypeAdapter(kind).validate_json(json.dumps(content, allow_nan=True, default=str))
+        return _validated(kind, content)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join(str(part) for part in first["loc"]) or "content"
-        reason = first["msg"].removeprefix("Value error, ")
-        raise InputError(f"{where}: {key}: {reason}") from None
+        first = _refusals(error)[0]
+        raise InputError(f"{where}: {first.key}: {first.reason}") from None
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a key, by its dotted path, was refused; `is_missing` and `is_unknown` tell of a key."""
+
+    key: str
+    reason: str
+    is_missing: bool
+    is_unknown: bool
+
+
+def refusals(kind: type[T], content: Any) -> list[Refusal]:
+    """All that keeps decoded TOML or JSON from being an object of a dataclass; empty if nothing.
+
+    What keys have to be among each other is seen only where each for itself is right.
+    """
+    try:
+        _validated(kind, content)
+    except ValidationError as error:
+        return _refusals(error)
+    return []
+
+
+def _validated(kind: type[T], content: Any) -> T:
+    # A TOML date is no JSON value; as text it is refused where a number is wanted.
+    return TypeAdapter(kind).validate_json(json.dumps(content, allow_nan=True, default=str))
+
+
+def _refusals(error: ValidationError) -> list[Refusal]:
+    found = []
+    for one in error.errors(include_url=False):
+        key = ".".join(str(part) for part in one["loc"]) or "content"
+        cause = one.get("ctx", {}).get("error")
+        reasons = cause.complaints if isinstance(cause, ManyInputError) else (one["msg"],)
+        found += [
+            Refusal(
+                key,
+                reason.removeprefix("Value error, "),
+                one["type"] in {"missing", "missing_argument"},
+                one["type"] in {"extra_forbidden", "unexpected_keyword_argument"},
+            )
+            for reason in reasons
+        ]
+    return found
 
 
 def read_text(path: Path) -> str:

@@ -20,6 +20,7 @@ from pathlib import Path
 import pytest
 
 from bms.model.model_file import shipped_model_path
+from bms.presets.authoring.form import form
 from tests.bms.kan_samples import write_recording
 from tests.firmware.ports import built, needs_emulator
 
@@ -59,6 +60,11 @@ COMMANDS: dict[str, tuple[int, str]] = {
     "compare-estimators": (0, "--preset lin2014 --quick --profiles 1 --out DIR/out"),
     "identify": (1, "--data DIR/run.csv"),
     "import-pykan": (0, "DIR/net --out DIR/model.json"),
+    "cell": (2, "--preset DIR/form.toml --out DIR/out"),
+    "preset new": (0, "my_cell --out DIR/cell.toml"),
+    "preset check": (1, "DIR/form.toml"),
+    "preset show": (0, "a123_26650"),
+    "preset diff": (0, "lin2014 paper_calibrated"),
     "flash": (0, "--image IMAGE/firmware.bin --flash DIR/flash.bin --no-start"),
     "cost": (2, "--target qemu:mps2-an386 --out DIR/cost.png"),
     "compare-targets": (2, "--target qemu:mps2-an386 --rows lost --build DIR"),
@@ -162,6 +168,8 @@ def arguments(text: str, folder: Path) -> list[str]:
     """Words with their places; what the command reads is put there."""
     if "run.csv" in text:
         write_recording(folder / "run.csv")
+    if "DIR/form.toml" in text:
+        (folder / "form.toml").write_text(form("my_cell"), encoding="utf-8")
     if "DIR/net" in text:
         kan = pytest.importorskip("kan", reason="not run: pykan is not installed")
         kan.KAN(width=[4, 1], grid=2, k=3, seed=1, auto_save=False).saveckpt(str(folder / "net"))
@@ -173,7 +181,9 @@ def arguments(text: str, folder: Path) -> list[str]:
 
 
 def test_no_command_is_left_out() -> None:
-    assert set(COMMANDS) == {entry.name for entry in entry_points(group="bms.commands")}
+    assert {name.split()[0] for name in COMMANDS} == {
+        entry.name for entry in entry_points(group="bms.commands")
+    }
 
 
 def test_this_user_may_write_neither_home_nor_installation(user: list[str], folder: Path) -> None:
@@ -197,7 +207,7 @@ def test_command(name: str, user: list[str], folder: Path) -> None:
     if name in EXTRAS:
         pytest.importorskip(EXTRAS[name], reason=f"not run: {EXTRAS[name]} is not installed")
     code, text = COMMANDS[name]
-    check(start(user, folder, name, *arguments(text, folder)), code)
+    check(start(user, folder, *name.split(), *arguments(text, folder)), code)
 
 
 def test_ecu_and_plant(user: list[str], folder: Path) -> None:

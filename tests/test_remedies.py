@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
+from typer.core import TyperGroup
 
 from bms import cli
 from bms.errors import InputError, ModelMismatchError
@@ -84,7 +85,11 @@ def parse(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
         assert cli.application([]).commands
     elif words[0] == "bms":
         command = cli.application(words[1:]).commands[words[1]]
-        command.make_context(words[1], words[2:])
+        context = command.make_context(words[1], words[2:])
+        if isinstance(context.command, TyperGroup):  # a command with commands of its own
+            name, subcommand, rest = context.command.resolve_command(context, words[2:])
+            assert subcommand is not None
+            subcommand.make_context(name, rest)
     elif words[0] == "make":
         rules = (ROOT / "Makefile").read_text() + (ROOT / "firmware_c/firmware.mk").read_text()
         assert re.search(rf"^{re.escape(words[1])}:", rules, re.MULTILINE), words

@@ -19,6 +19,7 @@ from bms.presets import DEFAULT_PRESET, Preset
 from bms.text_table import TextTable
 from bms.verification import (
     CLASHING_DELTA4,
+    ESTIMATE,
     LARGEST_BOXES,
     PARTS,
     SLIPS,
@@ -136,6 +137,8 @@ def _print(result: Verification) -> None:
             console.print(
                 f"{barrier.name}: NOT certified: {_finding(result.refusals[barrier.name])}"
             )
+    if ESTIMATE in result.refusals:
+        console.print(f"{ESTIMATE}: NOT usable: {_finding(result.refusals[ESTIMATE])}")
     margins = ", ".join(f"{name} {value:.4g}" for name, value in result.margins.items())
     console.print(f"margins: {margins}; error bound {result.error_bound_K:.4f} K")
     part = result.fallback

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from operator import attrgetter
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Le, MultipleOf
 
-from bms.bus_signals import RANGES, Interval
 from bms.cell import CellParameters
-from bms.errors import InputError
+from bms.errors import InputError, refuse
+from bms.presets.agreement import disagreements
 from bms.presets.digest import digest, plain
 from bms.validation import Finite, Negative, NonNegative, Positive, strict
 
@@ -233,9 +233,11 @@ class OperatingBox:
     coolant_temperature_K: Range
 
     def __post_init__(self) -> None:
-        for name, (low, high) in asdict(self).items():
-            if not low < high:
-                raise InputError(f"operating_box.{name}: must rise from low to high")
+        refuse(
+            f"operating_box.{name}: must rise from low to high"
+            for name, (low, high) in asdict(self).items()
+            if not low < high
+        )
 
     def ranges(self) -> tuple[Range, Range, Range, Range]:
         """The four ranges in the order of the estimator's inputs."""
@@ -272,20 +274,7 @@ class Preset:
     current_map: CurrentMap | None = None
 
     def __post_init__(self) -> None:
-        for key, values, (lowest, highest) in self._on_the_bus():
-            for value in values:
-                if not lowest <= value <= highest:
-                    raise InputError(
-                        f"{key}: {value:.10g} does not fit the CAN signal, which carries "
-                        f"{lowest:.10g} to {highest:.10g}"
-                    )
-        low, high = self.operating_box.current_A
-        if not low < self.limits.reference_current_A < 0.0 < high:
-            raise InputError(
-                "operating_box.current_A: must hold both limits.reference_current_A and 0"
-            )
-        if self.limits.completion_soc > self.limits.max_soc:
-            raise InputError("limits.completion_soc: must not exceed limits.max_soc")
+        refuse(disagreements(lambda key: attrgetter(key)(self)))
 
     @cached_property
     def hash(self) -> str:
@@ -304,19 +293,21 @@ class Preset:
         the preset's uncertainty, and what limits, gains, timing and plug-in state say beyond the
         above is the controller's.
         """
+        return digest(self.training_content())
+
+    def training_content(self) -> dict[str, Any]:
+        """What `training_hash` is of: tables and keys by their names here."""
         cell, sensors = plain(self.cell), plain(self.sensors)
         del cell["ocv"], sensors["voltage_V"]
         cell.pop("interval", None)
-        return digest(
-            {
-                "cell": cell,
-                "operating_box": self.operating_box,
-                "sensors": sensors,
-                "reference_current_A": self.limits.reference_current_A,
-                "core_limit_of_bound_K": self.core_limit_of_bound_K,
-                "sampling_period_s": self.timing.sampling_period_s,
-            }
-        )
+        return {
+            "cell": cell,
+            "operating_box": self.operating_box,
+            "sensors": sensors,
+            "reference_current_A": self.limits.reference_current_A,
+            "core_limit_of_bound_K": self.core_limit_of_bound_K,
+            "sampling_period_s": self.timing.sampling_period_s,
+        }
 
     @property
     def core_limit_of_bound_K(self) -> float:
@@ -327,19 +318,3 @@ class Preset:
         """
         hottest_K = self.operating_box.surface_temperature_K[1]
         return max(self.limits.max_core_temperature_K, hottest_K - BOX_ABOVE_CORE_LIMIT_K)
-
-    def _on_the_bus(self) -> Iterator[tuple[str, tuple[float, ...], Interval]]:
-        """Key, values and range of everything that the CAN bus has to carry."""
-        limits, start, box = self.limits, self.initial, self.operating_box
-        temperature_K, power_W = RANGES.temperature_K, RANGES.cooling_power_W
-        yield "limits.reference_current_A", (limits.reference_current_A,), RANGES.current_A
-        yield "limits.max_voltage_V", (limits.max_voltage_V,), RANGES.voltage_V
-        yield "limits.max_core_temperature_K", (limits.max_core_temperature_K,), temperature_K
-        yield "limits.max_surface_temperature_K", (limits.max_surface_temperature_K,), temperature_K
-        yield "initial.temperature_K", (start.temperature_K,), temperature_K
-        yield "initial.cooling_power_W", (start.cooling_power_W,), power_W
-        yield "cell.ocv.voltage_V", self.cell.ocv.voltage_V, RANGES.voltage_V
-        yield "operating_box.current_A", box.current_A, RANGES.current_A
-        yield "operating_box.cooling_power_W", box.cooling_power_W, power_W
-        yield "operating_box.surface_temperature_K", box.surface_temperature_K, temperature_K
-        yield "operating_box.coolant_temperature_K", box.coolant_temperature_K, temperature_K

@@ -31,10 +31,13 @@ def make_targets():
 @cache
 def options_of(command):
     """Options of a bms command, as its parser takes them."""
-    module, function = COMMANDS[command].split(":")
-    app = typer.Typer(add_completion=False)
-    app.command()(getattr(import_module(module), function))
-    parameters = typer.main.get_command(app).params
+    module, name = COMMANDS[command].split(":")
+    function = getattr(import_module(module), name)
+    parameters = []
+    for each in (function, *getattr(function, "subcommands", ())):
+        app = typer.Typer(add_completion=False)
+        app.command()(each)
+        parameters += typer.main.get_command(app).params
     return {"--help"}.union(*({*p.opts, *p.secondary_opts} for p in parameters))
 
 

@@ -10,6 +10,7 @@ import pytest
 from bms.barrier import sampling_margins
 from bms.cell import OpenCircuitVoltage
 from bms.presets import Preset, load_preset
+from bms.presets.authoring.keys import explanations
 from bms.presets.schema import Sensor, Sensors
 from tests.docs.pages import ROOT
 
@@ -78,6 +79,23 @@ def test_each_key_has_its_unit_by_its_name():
             assert unit == units[max(endings, key=len)], key
         else:
             assert unit in {"1", "text", "list of texts", "of the channel"}, key
+
+
+def in_words(text):
+    """A cell of the page as the form has it: no marks, no links, no word on leaving it out."""
+    text = re.sub(r" ?\(\[why\]\([^)]*\)\)", "", text).strip().replace("`", "").replace("**", "")
+    text = text.replace("; 0 when left out", "")
+    return re.sub(r";? ?may be left out(, and then the observer alone counts)?$", "", text)
+
+
+def test_the_page_says_of_each_key_what_the_form_says():
+    on_the_page = {}
+    for section in TEXT.split("\n## ")[1:]:
+        heading = re.match(r"`\[([\w.]+)\]`", section)
+        table = heading[1] if heading else ""
+        for row in re.findall(r"^\| `(\w+)` \| ([^|]+) \| ([^|]+) \|", section, re.MULTILINE):
+            on_the_page[f"{table}.{row[0]}".strip(".")] = (row[1], in_words(row[2]))
+    assert on_the_page == {key: (told.unit, told.what) for key, told in explanations().key.items()}
 
 
 def test_the_example_is_complete_and_loads(tmp_path):

@@ -1,0 +1,1 @@
+"""Help for whoever writes a preset: every key explained, complaints, a form, differences."""
