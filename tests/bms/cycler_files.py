@@ -81,7 +81,7 @@ def write(path: Path, rows: np.ndarray) -> Path:
 
 
 def campaign(folder: Path) -> dict[str, Path]:
-    """Slow discharge, 1C and 3C discharges, pulses from full to empty, and a 2C discharge unused."""
+    """Discharges at C/10, 1C and 3C, pulses from full to empty, and an unused one at 2C."""
     pulses = [(0.0, 60.0)]
     for _ in range(9):
         pulses += [(10.0, 20.0), (0.0, 180.0), (-2.5, 20.0), (0.0, 180.0), (5.0, 360.0)]
