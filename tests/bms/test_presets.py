@@ -95,7 +95,13 @@ def refused(load, path, value):
 
 
 def test_the_shipped_presets_are_these_and_carry_their_names():
-    assert preset_names() == ["a123_26650", "a123_26650_10C", "lin2014", "paper_calibrated"]
+    assert preset_names() == [
+        "a123_26650",
+        "a123_26650_10C",
+        "lin2014",
+        "paper_calibrated",
+        "samsung_30q",
+    ]
     for name in preset_names():
         preset = load_preset(name)
         assert preset.name == name
