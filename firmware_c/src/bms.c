@@ -146,32 +146,26 @@ static void follow_request(bms_t *bms, uint32_t symptoms)
     }
 }
 
-/* The weaker of two charging currents is the greater number. */
-static float weaker(float a_A, float b_A)
-{
-    return (a_A > b_A) ? a_A : b_A;
-}
-
-static float stronger(float a_A, float b_A)
-{
-    return (a_A < b_A) ? a_A : b_A;
-}
-
-/* What is asked for, within the preset's strongest current and the growth of one period. A plan weakens it, but no
- * plan is worth a step: the current follows a weaker one as gradually as it grows. */
+/* What is asked for, within the preset's strongest current and the growth of one period. To a weaker
+ * plan the current falls gradually, to a weaker request at once. The weaker of two charging currents
+ * is the greater number. */
 static float wanted_current_A(const bms_t *bms)
 {
     const bms_calibration_t *calibration = bms->calibration;
     const float asked_A = bms->measurement.reference_current_A;
-    const float planned_A = stronger(planner_reference_A(&bms->planner, asked_A),
-                                     bms->command_A + PLAN_FALL * calibration->current_growth_A);
-    return weaker(weaker(asked_A, planned_A), weaker(calibration->reference_current_A,
-                                                     bms->command_A - bms->growth_A));
+    const float planned_A =
+        numeric_smaller(bms->command_A + PLAN_FALL * calibration->current_growth_A,
+                        planner_reference_A(&bms->planner, asked_A));
+    const float allowed_A = numeric_larger(calibration->reference_current_A,
+                                           bms->command_A - bms->growth_A);
+    /* A request that is no number has to come last, to be refused. */
+    return numeric_larger(allowed_A, numeric_larger(planned_A, asked_A));
 }
 
-/* What a limit allows jitters with the noise of the readings. The current obeys each fall at once, and so
- * follows the lower side of that jitter if it rises slowly: it begins anew with a small growth where a
- * limit was met, and grows faster the longer none is. */
+/* What a limit allows jitters with the noise of the readings. The current obeys each fall at once,
+ * and so stays on the lower side of that jitter if it rises slowly: where a limit was met it begins
+ * anew with a small growth, and grows faster the longer none is. Until then that limit is the one
+ * that holds it back. */
 static void follow_growth(bms_t *bms)
 {
     const float most_A = bms->calibration->current_growth_A;
@@ -184,7 +178,7 @@ static void follow_growth(bms_t *bms)
     } else if (bms->decision.feasible && (bms->growth_A < most_A)) {
         bms->decision.active = bms->limit;
         bms->state = BMS_DERATED;
-        bms->growth_A = stronger(bms->growth_A + GROWTH_RISE * most_A, most_A);
+        bms->growth_A = numeric_smaller(bms->growth_A + GROWTH_RISE * most_A, most_A);
     }
 }
 

@@ -48,11 +48,12 @@ static float greatest_of(const float *cells, float greatest, uint32_t was_first,
     return is_known ? numeric_larger(greatest, cells[end - 1u]) : family_greatest(cells, first, end);
 }
 
-/* From three quarters of the last cell on towards the next one's, so that no bound jumps at the end of a cell. */
-static float towards_next(const float *cells, float greatest, uint32_t end, float past_quarters)
+/* In the last quarter of the last cell it goes on towards the next one's, so that no bound jumps where
+ * that begins. */
+static float towards_next(const float *cells, float greatest, uint32_t end, float share)
 {
-    const float rise = (end < FAMILY_SOC_CELLS) ? larger(0.0f, cells[end] - greatest) : 0.0f;
-    return greatest + past_quarters * rise;
+    const float rise = (end < FAMILY_SOC_CELLS) ? numeric_larger(0.0f, cells[end] - greatest) : 0.0f;
+    return greatest + share * rise;
 }
 
 void family_look_up_cells(family_t *family, const family_constants_t *constants, float soc_low,
@@ -71,9 +72,11 @@ void family_look_up_cells(family_t *family, const family_constants_t *constants,
         family->first_cell = (uint8_t)first;
         family->end_cell = (uint8_t)end;
     }
-    const float past = numeric_clamp(4.0f * (soc_high * (float)FAMILY_SOC_CELLS - (float)end) + 1.0f, 0.0f, 1.0f);
-    family->ocv_slope_V = towards_next(constants->ocv_slope_V, family->cells_slope_V, end, past);
-    family->entropic_V_per_K = towards_next(constants->entropic_V_per_K, family->cells_entropic_V_per_K, end, past);
+    const float share = numeric_clamp(
+        4.0f * (soc_high * (float)FAMILY_SOC_CELLS - (float)end) + 1.0f, 0.0f, 1.0f);
+    family->ocv_slope_V = towards_next(constants->ocv_slope_V, family->cells_slope_V, end, share);
+    family->entropic_V_per_K = towards_next(constants->entropic_V_per_K,
+                                            family->cells_entropic_V_per_K, end, share);
 }
 
 float family_rise_V_per_s(const family_t *family, const family_constants_t *constants,
