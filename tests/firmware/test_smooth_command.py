@@ -1,4 +1,4 @@
-"""A command without jitter: small steps where a limit is ridden, and never more than is admitted."""
+"""A smooth command: small steps where a limit is ridden, and never more than is admitted."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ def block(name: str) -> Any:
     return calibration_block(preset, load_shipped_model(name), compiled_in=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("preset", "start_K", "soc", "mode", "time_s"),
     [
