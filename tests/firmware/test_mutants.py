@@ -77,7 +77,7 @@ MUTANTS = [
     Mutant("growth is limited", "bms.c", "bms->command_A - bms->growth_A", "bms->command_A - 99.0f", STATES, "grows"),
     Mutant("a weaker request is obeyed at once", "bms.c", "numeric_larger(planned_A, asked_A)", "planned_A", STATES, "at_once"),
     Mutant("current rises slowly after a limit", "bms.c", "= LEAST_GROWTH * most_A", "= most_A", SMOOTH, "rises_slowly"),
-    Mutant("a steadied condition is no more than the reading's", "rcbf.c", "if (!(*kept <= f->constant))", "if (*kept != *kept)", SMOOTH, "no_stronger"),
+    Mutant("a steadied condition is no more than the reading's", "rcbf.c", "if (!(*kept <= f->constant))", "if (!(*kept <= f->constant + margin))", SMOOTH, "no_stronger"),
     Mutant("a steadied condition gives way after no number", "rcbf.c", "if (!(*kept <= f->constant))", "if (*kept > f->constant)", SMOOTH, "no_number"),
     Mutant("a steadied voltage is no less than the reading", "family_observer.c", "if (!(steady_V >= read_V))", "if (steady_V != steady_V)", SMOOTH, "believes_no_less"),
     Mutant("a charge needs the edge", "bms.c", "bms->may_start && (symptoms", "(symptoms", STATES, "edge"),
