@@ -85,16 +85,24 @@ def inputs(states: list[tuple[float, ...]]) -> list[Any]:
     return made
 
 
+NOISE_K = 0.05
 STATES = st.lists(
     st.tuples(
         st.floats(315.0, 323.2),
         st.floats(308.0, 322.5),
         st.floats(300.0, 315.0),
-        st.floats(-23.0, 0.0),
+        st.lists(st.floats(-NOISE_K, NOISE_K), min_size=2, max_size=10),
     ),
-    min_size=2,
-    max_size=20,
+    min_size=1,
+    max_size=4,
+).map(
+    lambda parts: [
+        (core_K, surface_K + noise_K, coolant_K, -23.0)
+        for core_K, surface_K, coolant_K, noises_K in parts
+        for noise_K in noises_K
+    ]
 )
+"""Readings that jitter, and now and then jump."""
 
 
 @pytest.mark.parametrize("preset", ["paper_calibrated", "lin2014"])
