@@ -112,10 +112,11 @@ rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t
 /* Nothing is remembered. */
 void rcbf_steadier_reset(rcbf_steadier_t *steadier);
 
-/* The same, for one period after the other: noise of the readings moves the current less. No
- * stronger current than that of rcbf_solve. */
+/* The same, for one period after the other, where the open-circuit voltage of the input's state of
+ * charge is known: noise of the readings moves the current less. No stronger current than that of
+ * rcbf_solve. */
 rcbf_decision_t rcbf_solve_steadily(const rcbf_constants_t *constants, const rcbf_input_t *input,
-                                    rcbf_steadier_t *steadier);
+                                    float open_circuit_voltage_V, rcbf_steadier_t *steadier);
 
 #ifdef __cplusplus
 }

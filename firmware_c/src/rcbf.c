@@ -59,10 +59,10 @@ static float difference_K(rcbf_temperature_t a, rcbf_temperature_t b)
     return (a.high_K - b.high_K) + (a.low_K - b.low_K);
 }
 
-NUMERIC_INLINE line_t voltage_left(const rcbf_constants_t *k, const rcbf_input_t *in)
+NUMERIC_INLINE line_t voltage_left(const rcbf_constants_t *k, float open_circuit_voltage_V)
 {
     return (line_t){
-        k->max_voltage_V - rcbf_open_circuit_voltage_V(k, in->soc) - k->voltage_margin_V,
+        k->max_voltage_V - open_circuit_voltage_V - k->voltage_margin_V,
         k->ohmic_resistance_ohm,
     };
 }
@@ -240,16 +240,17 @@ rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t
 {
     rcbf_steadier_t none;
     rcbf_steadier_reset(&none);
-    return rcbf_solve_steadily(constants, input, &none);
+    return rcbf_solve_steadily(constants, input,
+                               rcbf_open_circuit_voltage_V(constants, input->soc), &none);
 }
 
 rcbf_decision_t rcbf_solve_steadily(const rcbf_constants_t *constants, const rcbf_input_t *input,
-                                    rcbf_steadier_t *steadier)
+                                    float open_circuit_voltage_V, rcbf_steadier_t *steadier)
 {
     if (!is_physical(input)) {
         return (rcbf_decision_t){ .active = RCBF_INVALID };
     }
-    const line_t voltage = voltage_left(constants, input);
+    const line_t voltage = voltage_left(constants, open_circuit_voltage_V);
     const line_t soc = soc_left(constants, input);
     robust_t robust[2] = { core_left(constants, input), surface_left(constants, input) };
     steady(&steadier->core_K_per_s, &robust[0].mean, constants->core_margin_K_per_s);

@@ -86,6 +86,15 @@ def inputs(states: list[tuple[float, ...]]) -> list[Any]:
 
 
 NOISE_K = 0.05
+
+
+def steadily(constants: Any, made: Any, steadier: Any) -> Any:
+    """The decision with a memory, for the open-circuit voltage of the input's state of charge."""
+    return lib.rcbf_solve_steadily(
+        constants, made, lib.rcbf_open_circuit_voltage_V(constants, made.soc), steadier
+    )
+
+
 STATES = st.lists(
     st.tuples(
         st.floats(315.0, 323.2),
@@ -116,7 +125,7 @@ def test_a_steadied_decision_is_no_stronger_than_that_of_the_same_readings(
     lib.rcbf_steadier_reset(steadier)
     for number, made in enumerate(inputs(states)):
         plain = lib.rcbf_solve(constants, made)
-        steadied = lib.rcbf_solve_steadily(constants, made, steadier)
+        steadied = steadily(constants, made, steadier)
         if number == 0:
             assert steadied.current_A == plain.current_A
         assert steadied.current_A >= plain.current_A - 1e-4
@@ -132,7 +141,7 @@ def test_a_steadied_decision_recovers_from_what_is_no_number() -> None:
     steadier = ffi.new(
         "rcbf_steadier_t *", {"core_K_per_s": math.nan, "surface_K_per_s2": math.nan}
     )
-    steadied = lib.rcbf_solve_steadily(constants, made, steadier)
+    steadied = steadily(constants, made, steadier)
     assert steadied.feasible
     assert steadied.current_A == lib.rcbf_solve(constants, made).current_A
 
