@@ -26,7 +26,7 @@
 extern "C" {
 #endif
 
-#define BMS_FIRMWARE_VERSION 3
+#define BMS_FIRMWARE_VERSION 4
 #define BMS_TRANSMITTED_MESSAGES 9
 
 typedef enum {
@@ -64,6 +64,9 @@ typedef struct {
     planner_t planner;
     rcbf_decision_t decision;
     float command_A;
+    float growth_A;       /* most that the command may grow by in the coming period */
+    rcbf_active_t limit;  /* that kept it from growing freely, last */
+    rcbf_steadier_t steadier;
     uint8_t counters[BMS_TRANSMITTED_MESSAGES];
     can_frame_t outbox[BMS_TRANSMITTED_MESSAGES];
     uint32_t outbox_length;

@@ -9,6 +9,13 @@
 #include "numeric.h"
 #include "request.h"
 
+/* Shares of the preset's growth: with which the current rises after it has met a limit, and what is
+ * added in each period without one. */
+#define LEAST_GROWTH 0.0067f
+#define GROWTH_RISE 0.0133f
+/* With which the current falls to a weaker plan. */
+#define PLAN_FALL 0.25f
+
 /* Periods that the other nodes have to come up before their silence is a fault. */
 #define START_UP_PERIODS 50u
 
@@ -149,16 +156,40 @@ static void follow_request(bms_t *bms, uint32_t symptoms)
     }
 }
 
-/* What is asked for, no more than planned, within the preset's strongest current and its growth in one period. The weaker
- * of two charging currents is the greater number. */
+/* What is asked for, within the preset's strongest current and the growth of one period. To a weaker
+ * plan the current falls gradually, to a weaker request at once. The weaker of two charging currents
+ * is the greater number. */
 static float wanted_current_A(const bms_t *bms)
 {
-    const float asked_A =
-        planner_reference_A(&bms->planner, bms->measurement.reference_current_A);
-    const float strongest_A = bms->calibration->reference_current_A;
-    const float grown_A = bms->command_A - bms->calibration->current_growth_A;
-    const float allowed_A = (grown_A < strongest_A) ? strongest_A : grown_A;
-    return (asked_A < allowed_A) ? allowed_A : asked_A;
+    const bms_calibration_t *calibration = bms->calibration;
+    const float asked_A = bms->measurement.reference_current_A;
+    const float planned_A =
+        numeric_smaller(bms->command_A + PLAN_FALL * calibration->current_growth_A,
+                        planner_reference_A(&bms->planner, asked_A));
+    const float allowed_A = numeric_larger(calibration->reference_current_A,
+                                           bms->command_A - bms->growth_A);
+    /* A request that is no number has to come last, to be refused. */
+    return numeric_larger(allowed_A, numeric_larger(planned_A, asked_A));
+}
+
+/* What a limit allows jitters with the noise of the readings. The current obeys each fall at once,
+ * and so stays on the lower side of that jitter if it rises slowly: where a limit was met it begins
+ * anew with a small growth, and grows faster the longer none is. Until then that limit is the one
+ * that holds it back. */
+static void follow_growth(bms_t *bms)
+{
+    const float most_A = bms->calibration->current_growth_A;
+    if (!is_charging(bms) || bms->monitor.stop) {
+        bms->growth_A = most_A;
+        rcbf_steadier_reset(&bms->steadier);
+    } else if (bms->decision.feasible && (bms->decision.active != RCBF_NONE)) {
+        bms->limit = bms->decision.active;
+        bms->growth_A = LEAST_GROWTH * most_A;
+    } else if (bms->decision.feasible && (bms->growth_A < most_A)) {
+        bms->decision.active = bms->limit;
+        bms->state = BMS_DERATED;
+        bms->growth_A = numeric_smaller(bms->growth_A + GROWTH_RISE * most_A, most_A);
+    }
 }
 
 static bool is_full(const bms_t *bms)
@@ -195,8 +226,8 @@ static void decide(bms_t *bms)
             .cooling_power_W = m->cooling_power_W,
             .reference_current_A = wanted_current_A(bms),
         };
-        bms->decision =
-            rcbf_solve_at(&calibration->rcbf, &input, bms->open_circuit_voltage_V);
+        bms->decision = rcbf_solve_steadily(&calibration->rcbf, &input,
+                                            bms->open_circuit_voltage_V, &bms->steadier);
         bms->state = (bms->decision.active == RCBF_NONE) ? BMS_CHARGING : BMS_DERATED;
     }
 }
@@ -232,6 +263,7 @@ static void run_period(bms_t *bms)
     }
     const bool may_charge = is_charging(bms) && !bms->monitor.stop && bms->decision.feasible;
     bms->command_A = may_charge ? bms->decision.current_A : 0.0f;
+    follow_growth(bms);
 }
 
 static void queue_frames(bms_t *bms)

@@ -116,9 +116,10 @@ rcbf_decision_t family_decide(const family_t *family, const family_constants_t *
     const float held_A =
         strongest_in_hold_A(family, constants, heat.at_most_A, -reference_current_A);
     const float drifting_V = drift_V(family, constants, held_A);
+    const float above_reading_V = family->steadied_V + drifting_V;
     const float room_V =
-        cell->max_voltage_V - reading->voltage_V - constants->voltage_error_V - drifting_V;
-    heat.overpotential_V += drifting_V;
+        cell->max_voltage_V - reading->voltage_V - constants->voltage_error_V - above_reading_V;
+    heat.overpotential_V += above_reading_V;
 
     float strength_A = -reference_current_A * factor;
     rcbf_active_t active = RCBF_NONE;

@@ -5,6 +5,11 @@
 #include "family_tables.h"
 #include "numeric.h"
 
+/* Of the way to the present voltage that the steadied one goes in a period, and what it keeps above
+ * it on average, as a share of the reading's error; that much noise does not move it at once. */
+#define STEADY_SHARE 0.4f
+#define STEADY_RESERVE 0.5f
+
 /* Periods without usable readings that are bridged. */
 #define MAX_BRIDGED 3u
 
@@ -274,6 +279,21 @@ static void bridge(family_t *family, const family_constants_t *constants)
                        strength_A * constants->disturbance_W_per_A2));
 }
 
+/* The voltage less the least ohmic drop, steadied: never less than was read, so that only current is
+ * lost by it. What is no number gives way to the reading. */
+NUMERIC_INLINE void steady_voltage(family_t *family, const family_constants_t *constants,
+                                   float voltage_V, float strength_A)
+{
+    const float read_V = voltage_V - constants->least_resistance_ohm * strength_A;
+    float steady_V = family->steady_voltage_V;
+    steady_V += STEADY_SHARE * (read_V + STEADY_RESERVE * constants->voltage_error_V - steady_V);
+    if (!(steady_V >= read_V)) {
+        steady_V = read_V;
+    }
+    family->steady_voltage_V = steady_V;
+    family->steadied_V = steady_V - read_V;
+}
+
 void family_observe(family_t *family, const family_constants_t *constants,
                     const rcbf_constants_t *cell, const family_reading_t *reading)
 {
@@ -291,6 +311,7 @@ void family_observe(family_t *family, const family_constants_t *constants,
     const family_heat_t heat = family_heat(family, constants, strength_A);
     follow_polarisation(family, constants, &branches, heat.at_least_A);
     look_for_full(family, constants, reading, heat.at_most_A);
+    steady_voltage(family, constants, reading->voltage_V, strength_A);
     const bool rests = is_at_rest(constants, reading);
     if (!rests && !reading->is_charging) {
         forget_after_load(family, constants);

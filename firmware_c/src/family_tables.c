@@ -48,6 +48,14 @@ static float greatest_of(const float *cells, float greatest, uint32_t was_first,
     return is_known ? numeric_larger(greatest, cells[end - 1u]) : family_greatest(cells, first, end);
 }
 
+/* In the last quarter of the last cell it goes on towards the next one's, so that no bound jumps where
+ * that begins. */
+static float towards_next(const float *cells, float greatest, uint32_t end, float share)
+{
+    const float rise = (end < FAMILY_SOC_CELLS) ? numeric_larger(0.0f, cells[end] - greatest) : 0.0f;
+    return greatest + share * rise;
+}
+
 void family_look_up_cells(family_t *family, const family_constants_t *constants, float soc_low,
                           float soc_high)
 {
@@ -56,14 +64,19 @@ void family_look_up_cells(family_t *family, const family_constants_t *constants,
     const uint32_t was_first = family->first_cell;
     const uint32_t was_end = family->end_cell;
     if ((first != was_first) || (end != was_end)) {
-        family->ocv_slope_V = greatest_of(constants->ocv_slope_V, family->ocv_slope_V, was_first,
+        family->cells_slope_V = greatest_of(constants->ocv_slope_V, family->cells_slope_V, was_first,
                                           was_end, first, end);
-        family->entropic_V_per_K = greatest_of(constants->entropic_V_per_K,
-                                               family->entropic_V_per_K, was_first, was_end,
+        family->cells_entropic_V_per_K = greatest_of(constants->entropic_V_per_K,
+                                               family->cells_entropic_V_per_K, was_first, was_end,
                                                first, end);
         family->first_cell = (uint8_t)first;
         family->end_cell = (uint8_t)end;
     }
+    const float share = numeric_clamp(
+        4.0f * (soc_high * (float)FAMILY_SOC_CELLS - (float)end) + 1.0f, 0.0f, 1.0f);
+    family->ocv_slope_V = towards_next(constants->ocv_slope_V, family->cells_slope_V, end, share);
+    family->entropic_V_per_K = towards_next(constants->entropic_V_per_K,
+                                            family->cells_entropic_V_per_K, end, share);
 }
 
 float family_rise_V_per_s(const family_t *family, const family_constants_t *constants,

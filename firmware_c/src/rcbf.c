@@ -21,6 +21,11 @@
 /* Share of its terms that a function has to be above 0, for its roots to be left alone. */
 #define CLEARLY 1e-5f
 
+/* Of the way to the present reading that a steadied condition goes in a period, and what it keeps
+ * below it on average, as a share of the margin; that much noise does not move it at once. */
+#define STEADY_SHARE 0.2f
+#define STEADY_RESERVE 0.25f
+
 /* constant + linear u >= 0 with linear > 0 */
 typedef struct {
     float constant;
@@ -215,20 +220,41 @@ NUMERIC_INLINE bool is_physical(const rcbf_input_t *in)
            (in->reference_current_A <= 0.0f);
 }
 
-rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t *input)
+void rcbf_steadier_reset(rcbf_steadier_t *steadier)
 {
-    return rcbf_solve_at(constants, input, rcbf_open_circuit_voltage_V(constants, input->soc));
+    *steadier = (rcbf_steadier_t){ FLT_MAX, FLT_MAX };
 }
 
-rcbf_decision_t rcbf_solve_at(const rcbf_constants_t *constants, const rcbf_input_t *input,
-                              float open_circuit_voltage_V)
+/* What a condition leaves at 0 A, steadied: never more than the reading says, so that only current
+ * is lost by it. What is no number gives way to the reading. */
+static void steady(float *kept, concave_t *f, float margin)
+{
+    *kept += STEADY_SHARE * (f->constant - STEADY_RESERVE * margin - *kept);
+    if (!(*kept <= f->constant)) {
+        *kept = f->constant;
+    }
+    f->constant = *kept;
+}
+
+rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t *input)
+{
+    rcbf_steadier_t none;
+    rcbf_steadier_reset(&none);
+    return rcbf_solve_steadily(constants, input,
+                               rcbf_open_circuit_voltage_V(constants, input->soc), &none);
+}
+
+rcbf_decision_t rcbf_solve_steadily(const rcbf_constants_t *constants, const rcbf_input_t *input,
+                                    float open_circuit_voltage_V, rcbf_steadier_t *steadier)
 {
     if (!is_physical(input)) {
         return (rcbf_decision_t){ .active = RCBF_INVALID };
     }
     const line_t voltage = voltage_left(constants, open_circuit_voltage_V);
     const line_t soc = soc_left(constants, input);
-    const robust_t robust[2] = { core_left(constants, input), surface_left(constants, input) };
+    robust_t robust[2] = { core_left(constants, input), surface_left(constants, input) };
+    steady(&steadier->core_K_per_s, &robust[0].mean, constants->core_margin_K_per_s);
+    steady(&steadier->surface_K_per_s2, &robust[1].mean, constants->surface_margin_K_per_s2);
     interval_t interval = { input->reference_current_A, 0.0f, RCBF_NONE };
     narrow_by_line(&interval, voltage, RCBF_VOLTAGE);
     narrow_by_line(&interval, soc, RCBF_SOC);

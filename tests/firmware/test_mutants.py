@@ -36,6 +36,7 @@ FAULTS, ESTIMATE = "tests/firmware/test_ecu_faults.py", "tests/firmware/test_kan
 NETWORK, PROTECTION = "tests/firmware/test_supervision.py", "tests/firmware/test_e2e.py"
 PLANNED = "tests/firmware/test_planner.py"
 PLANNED_FAMILY = "tests/firmware/test_planner_family.py"
+SMOOTH = "tests/firmware/test_smooth_command.py"
 MARGINS = "names_the_constraint"
 
 MUTANTS = [
@@ -73,7 +74,12 @@ MUTANTS = [
     Mutant("a reading not available keeps its own name", "bms.c", "!monitor_stops(symptoms) && is_charging(bms)", "is_charging(bms)", FAULTS, "is_named"),
     Mutant("codes do not wrap", "codec.c", "(value < all_ones) ? value : all_ones", "value", "tests/firmware/test_codec_messages.py", "reads_back"),
     Mutant("the reference has a ceiling", "bms.c", "(grown_A < strongest_A) ? strongest_A :", "", STATES, "reference"),
-    Mutant("growth is limited", "bms.c", "(asked_A < allowed_A) ? allowed_A", "(asked_A < strongest_A) ? strongest_A", STATES, "grows"),
+    Mutant("growth is limited", "bms.c", "bms->command_A - bms->growth_A", "bms->command_A - 99.0f", STATES, "grows"),
+    Mutant("a weaker request is obeyed at once", "bms.c", "numeric_larger(planned_A, asked_A)", "planned_A", STATES, "at_once"),
+    Mutant("current rises slowly after a limit", "bms.c", "= LEAST_GROWTH * most_A", "= most_A", SMOOTH, "rises_slowly"),
+    Mutant("a steadied condition is no more than the reading's", "rcbf.c", "if (!(*kept <= f->constant))", "if (!(*kept <= f->constant + margin))", SMOOTH, "no_stronger"),
+    Mutant("a steadied condition gives way after no number", "rcbf.c", "if (!(*kept <= f->constant))", "if (*kept > f->constant)", SMOOTH, "no_number"),
+    Mutant("a steadied voltage is no less than the reading", "family_observer.c", "if (!(steady_V >= read_V))", "if (steady_V != steady_V)", SMOOTH, "believes_no_less"),
     Mutant("a charge needs the edge", "bms.c", "bms->may_start && (symptoms", "(symptoms", STATES, "edge"),
     Mutant("a charge ends when complete", "bms.c", "bms->state = BMS_COMPLETE;", "bms->state = BMS_CHARGING;", STATES, "complete"),
     Mutant("the command is counted too", "soc.c", "? state->commanded.soc", "? state->measured.soc", STATES, "counted"),
