@@ -23,6 +23,7 @@ const fault_policy_t MONITOR_POLICY[FAULT_COUNT] = {
     [FAULT_DECISION_INVALID] = { 2u, true, 0u },
     [FAULT_CALIBRATION] = { 1u, true, 0u },
     [FAULT_SURFACE_DEFICIT] = { 5u, true, 0u },
+    [FAULT_OUT_OF_STEP] = { 1u, true, 0u },
 };
 
 void monitor_reset(monitor_t *monitor)

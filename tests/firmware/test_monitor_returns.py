@@ -19,7 +19,7 @@ def native(tmp_path_factory: pytest.TempPathFactory) -> Native:
         tmp_path_factory.mktemp("monitor"),
         sources,
         ["include/monitor.h"],
-        extra="extern const fault_policy_t MONITOR_POLICY[20];",
+        extra="extern const fault_policy_t MONITOR_POLICY[21];",
     )
 
 
@@ -121,7 +121,7 @@ def test_a_broken_count_is_noticed(
         sources,
         ["include/monitor.h"],
         ("monitor.c", old, new),
-        "extern const fault_policy_t MONITOR_POLICY[20];",
+        "extern const fault_policy_t MONITOR_POLICY[21];",
     )
     checks = (
         test_the_last_of_its_returns_within_the_window_latches,
