@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bms.errors import BusError
-from bms.firmware import Reception, ReceptionCounts
+from bms.firmware import ReceptionCounts
 from hil_sim.bus import catalog
 from hil_sim.bus.buses import CanBus, Frame, ecu_remedy, is_serial_line
 from hil_sim.bus.catalog import Message
@@ -15,6 +15,7 @@ from hil_sim.bus.e2e import Receiver, Sender
 from hil_sim.bus.fault_bits import FaultBits
 from hil_sim.bus.identity import Identity
 from hil_sim.logs.recorder import Recorder
+from hil_sim.nodes.commands import CommandReceiver
 from hil_sim.nodes.turns import MOST_FRAMES, Turn
 from hil_sim.plant.sensors import Readings
 
@@ -58,9 +59,12 @@ class Request:
 class Answer:
     """What the ECU said in one period: values by signal name, None where it said nothing."""
 
-    def __init__(self, values: Values, is_command_usable: bool, latched_faults: int | None) -> None:
+    def __init__(
+        self, values: Values, usable_command_A: float | None, latched_faults: int | None
+    ) -> None:
         self._values = values
-        self._is_command_usable = is_command_usable
+        self.usable_command_A = usable_command_A
+        """Current in A that a charger may supply; None without a command of a valid message."""
         self.latched_faults = latched_faults
         """Bit n for fault n; None where the ECU said nothing."""
 
@@ -72,11 +76,6 @@ class Answer:
     def command_A(self) -> float | None:
         """Commanded current in A."""
         return self.value("CommandCurrent")
-
-    @property
-    def usable_command_A(self) -> float | None:
-        """Commanded current in A that a charger may use: the message is valid, not only intact."""
-        return self.command_A if self._is_command_usable else None
 
     @property
     def state(self) -> str | None:
@@ -124,7 +123,7 @@ class PlantNode:
         self._receivers = {database[name].frame_id: Receiver(database[name]) for name in _REPORTS}
         self._identity = database[Message.IDENTITY]
         self._command = database[Message.CHARGE_COMMAND]
-        self._reception = Reception(self._command.frame_id)
+        self._commands = CommandReceiver(self._command)
         self._faults = FaultBits()
         self._foreign_version: str | None = None
         self._last_counter: int | None = None
@@ -134,7 +133,7 @@ class PlantNode:
     @property
     def command_counts(self) -> ReceptionCounts:
         """Charge commands that were not as they should be."""
-        return self._reception.counts
+        return self._commands.counts
 
     def wait(self) -> None:
         """Return when the next period is due; at once in virtual time."""
@@ -196,7 +195,11 @@ class PlantNode:
 
     def _listen(self, period: int) -> list[StampedFrame]:
         answers = self._turn.answers(self._bus, period, self._is_last)
-        return [(self._turn.time_s(period), frame) for frame in answers]
+        heard = [(self._turn.time_s(period), frame) for frame in answers]
+        if heard and self._turn.sync:
+            # What another sender says ahead of the ECU must not hide what the ECU says.
+            heard += self._late_frames(period)
+        return heard
 
     def _is_answered(self, heard: list[StampedFrame]) -> bool:
         return any(self._is_last(frame) for _, frame in heard)
@@ -263,13 +266,12 @@ class PlantNode:
             receiver = self._receivers.get(frame.frame_id)
             if receiver is not None:
                 values.update(receiver.accept(frame.data) or {})
-            elif frame.frame_id == self._command.frame_id and self._reception.check(frame.data):
+            elif frame.frame_id == self._command.frame_id and self._commands.check(frame.data):
                 values.update(self._command.decode(frame.data) or {})
         self._faults.take(values)
         is_told = values.get("LatchedFaults") is not None
-        return Answer(
-            values, self._reception.end_period(), self._faults.latched if is_told else None
-        )
+        usable_A = self._commands.end_period(values.get("CommandCurrent"))
+        return Answer(values, usable_A, self._faults.latched if is_told else None)
 
 
 def _label(labels: dict[int, str], value: float | None) -> str | None:
