@@ -144,7 +144,7 @@ def test_a_masquerade_with_a_frozen_counter_neither_makes_commands_late_nor_is_o
         command_A == pytest.approx(-0.1 * period) for period, command_A in enumerate(commands_A, 1)
     )
     assert own + commands_A.count(0.0) + commands_A.count(None) == 64
-    assert own >= 64 - 7 * 64 / COUNTER_MODULUS, "a contradiction ends with its window"
+    assert own >= 64 - 8 * 64 / COUNTER_MODULUS, "a contradiction ends with its window"
 
 
 @pytest.mark.parametrize("place", ["ahead", "behind"])
