@@ -44,12 +44,6 @@ static const envelope_t ENVELOPE[] = {
     WITHIN(plausibility.surface_deficit_K, 1e-6f, 30.0f),
 };
 
-/* False for NaN. */
-static bool is_within(float value, float low, float high)
-{
-    return (value >= low) && (value <= high);
-}
-
 static bool range_is_valid(const range_t *range)
 {
     return numeric_is_finite(range->low) && numeric_is_finite(range->high) &&
@@ -63,7 +57,7 @@ static bool plausibility_is_valid(const plausibility_t *limits)
                  range_is_valid(&limits->coolant_temperature_K) &&
                  range_is_valid(&limits->cooling_power_W);
     for (uint32_t i = 0u; i < KAN_MEASURED_INPUTS; i++) {
-        valid = valid && is_within(limits->reading_error[i], 0.0f, LARGEST_READING_ERROR);
+        valid = valid && numeric_is_within(limits->reading_error[i], 0.0f, LARGEST_READING_ERROR);
     }
     return valid;
 }
@@ -71,9 +65,10 @@ static bool plausibility_is_valid(const plausibility_t *limits)
 static bool is_in_envelope(const bms_calibration_t *calibration)
 {
     bool inside = true;
-    for (uint32_t i = 0u; i < sizeof ENVELOPE / sizeof ENVELOPE[0]; i++) {
-        const float *value = (const float *)((const uint8_t *)calibration + ENVELOPE[i].place);
-        inside = inside && is_within(*value, ENVELOPE[i].low, ENVELOPE[i].high);
+    for (uint32_t i = 0u; i < NUMERIC_COUNT(ENVELOPE); i++) {
+        const envelope_t *row = &ENVELOPE[i];
+        inside = inside &&
+                 numeric_members_are_within(calibration, &row->place, 1u, row->low, row->high);
     }
     return inside;
 }
