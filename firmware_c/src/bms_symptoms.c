@@ -28,7 +28,7 @@ static bool current_deviates(const bms_t *bms)
         return !family_supply_is_plausible(&bms->family, &calibration->family, current_A,
                                            deviation_A);
     }
-    return !(numeric_abs(current_A - bms->command_A) <= deviation_A);
+    return numeric_abs(current_A - bms->command_A) > deviation_A;
 }
 
 static bool voltage_deviates(const bms_t *bms)
@@ -44,7 +44,7 @@ static bool voltage_deviates(const bms_t *bms)
     }
     const float model_V = rcbf_open_circuit_voltage_V(cell, bms->soc.soc) -
                           m->current_A * cell->ohmic_resistance_ohm;
-    return !(numeric_abs(m->voltage_V - model_V) <= deviation_V);
+    return numeric_abs(m->voltage_V - model_V) > deviation_V;
 }
 
 static bool core_is_too_hot(const bms_t *bms)
