@@ -20,16 +20,19 @@ void network_receive(network_t *network, const can_frame_t *frame,
 {
     for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
         const codec_message_t *message = &CAN_RECEIVED[i];
+        if (frame->id != message->id) {
+            continue;
+        }
         e2e_receiver_t *receiver = &network->receivers[i];
         const uint8_t counter = receiver->counter;
-        if ((frame->id == message->id) &&
-            (e2e_check(receiver, frame->data, frame->length, message->length,
-                       message->data_ids, message->policy.max_delta_counter) == E2E_OK)) {
+        if (e2e_check(receiver, frame->data, frame->length, message->length, message->data_ids,
+                      message->policy.max_delta_counter) == E2E_OK) {
             codec_read(i, frame->data, measurement);
             if (i == CAN_RECEIVED_CELL_ELECTRICAL) {
                 count_periods(network, counter, receiver->counter);
             }
         }
+        return; /* no two messages have one identifier */
     }
 }
 

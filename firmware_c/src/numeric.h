@@ -5,7 +5,6 @@
 #include <float.h>
 #include <stdbool.h>
 #include <stdint.h>
-#include <string.h>
 
 /* Where a call costs more than what it calls; other compilers decide themselves. */
 #if defined(__GNUC__) && (!defined(__arm__) || defined(__ARM_FP))
@@ -95,9 +94,8 @@ static inline bool numeric_members_are_within(const void *structure, const uint1
 {
     bool within = true;
     for (uint32_t i = 0u; i < count; i++) {
-        float value;
-        (void)memcpy(&value, (const uint8_t *)structure + offsets[i], sizeof value);
-        within = within && numeric_is_within(value, low, high);
+        const void *member = (const uint8_t *)structure + offsets[i];
+        within = within && numeric_is_within(*(const float *)member, low, high);
     }
     return within;
 }

@@ -30,7 +30,11 @@ bool planner_constants_are_valid(const planner_constants_t *constants)
 
 void planner_reset(planner_t *planner)
 {
-    *planner = (planner_t){ .age_s = SEARCH_EVERY_S, .planned_A = NAN, .time_to_full_s = NAN };
+    /* What a search needs, it sets when it begins. */
+    planner->is_searching = false;
+    planner->age_s = SEARCH_EVERY_S;
+    planner->planned_A = NAN;
+    planner->time_to_full_s = NAN;
 }
 
 bool planner_is_due(const planner_t *planner)

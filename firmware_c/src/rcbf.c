@@ -54,10 +54,10 @@ static float difference_K(rcbf_temperature_t a, rcbf_temperature_t b)
     return (a.high_K - b.high_K) + (a.low_K - b.low_K);
 }
 
-NUMERIC_INLINE line_t voltage_left(const rcbf_constants_t *k, const rcbf_input_t *in)
+NUMERIC_INLINE line_t voltage_left(const rcbf_constants_t *k, float open_circuit_voltage_V)
 {
     return (line_t){
-        k->max_voltage_V - rcbf_open_circuit_voltage_V(k, in->soc) - k->voltage_margin_V,
+        k->max_voltage_V - open_circuit_voltage_V - k->voltage_margin_V,
         k->ohmic_resistance_ohm,
     };
 }
@@ -219,10 +219,16 @@ NUMERIC_INLINE bool is_physical(const rcbf_input_t *in)
 
 rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t *input)
 {
+    return rcbf_solve_at(constants, input, rcbf_open_circuit_voltage_V(constants, input->soc));
+}
+
+rcbf_decision_t rcbf_solve_at(const rcbf_constants_t *constants, const rcbf_input_t *input,
+                              float open_circuit_voltage_V)
+{
     if (!is_physical(input)) {
         return (rcbf_decision_t){ .active = RCBF_INVALID };
     }
-    const line_t voltage = voltage_left(constants, input);
+    const line_t voltage = voltage_left(constants, open_circuit_voltage_V);
     const line_t soc = soc_left(constants, input);
     const robust_t robust[2] = { core_left(constants, input), surface_left(constants, input) };
     interval_t interval = { input->reference_current_A, 0.0f, RCBF_NONE };

@@ -15,6 +15,7 @@ from hil_sim.plant.sensors import Readings
 
 READINGS = Readings(-1.0, 3.3, 300.0, 299.0, 1.0)
 PERIODS_TO_TRUST = 3
+WINDOW_PERIODS = 5
 REQUEST = Request(charge=False, reference_current_A=-23.0, plug_in_soc=0.1)
 
 
@@ -177,6 +178,30 @@ def test_a_command_of_somebody_else_never_makes_the_charger_stronger(
     assert min(command_A for command_A in usable_A if command_A is not None) >= own_A - 1e-6
     if pattern == (1,):
         assert usable_A[4:] == [0.0] * 26, "contradiction stops the charger"
+
+
+@pytest.mark.parametrize("ahead", [0, 1], ids=["before the ECU's own", "after it, for the next"])
+def test_after_one_command_that_passes_for_the_ecus_the_next_are_those_of_their_own_periods(
+    database, ahead
+):
+    """It stops the charger for a window of periods, is never obeyed, and delays none."""
+    codec = database["ChargeCommand"]
+
+    def serve(wire):
+        period = len(wire.heard)
+        counter = (PERIODS_TO_TRUST + period - 1 + ahead) % COUNTER_MODULUS
+        forged = Frame(codec.frame_id, codec.encode({"CommandCurrent": -20.0}, counter))
+        own = wire._command.frame({"CommandCurrent": -0.1 * period})
+        both = [own, forged] if ahead else [forged, own]
+        wire.far.send(*(both if period == 2 else [own]))
+
+    with Wire("virtual:forged", database, serve) as wire:
+        wire.trusted()
+        commands_A = [wire.exchange().usable_command_A for _ in range(20)]
+    expected_A = [-0.1 * period for period in range(1, 21)]
+    contested = slice(1 + ahead, 1 + ahead + WINDOW_PERIODS)
+    expected_A[contested] = [0.0] * WINDOW_PERIODS
+    assert commands_A == pytest.approx(expected_A)
 
 
 def test_an_ecu_that_restarts_is_followed_after_one_wait(database):
