@@ -60,6 +60,9 @@ static image_status_t check_part(const image_memory_t *place, uint32_t magic, ui
 
 image_status_t image_check_boot(const image_memory_t *place)
 {
+    if (place->length < sizeof(uint32_t)) {
+        return IMAGE_WRONG_LENGTH;
+    }
     const uint32_t covered = place->length - (uint32_t)sizeof(uint32_t);
     const uint32_t *crc32 = (const uint32_t *)(const void *)&place->bytes[covered];
     return (image_crc32(place->bytes, covered) == *crc32) ? IMAGE_OK : IMAGE_WRONG_CRC;

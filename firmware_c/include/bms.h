@@ -17,6 +17,7 @@
 #include "kan.h"
 #include "monitor.h"
 #include "network.h"
+#include "pace.h"
 #include "planner.h"
 #include "rcbf.h"
 #include "soc.h"
@@ -48,6 +49,7 @@ typedef struct {
     uint32_t periods;
     codec_measurement_t measurement;
     network_t network;
+    pace_t pace;
     bool has_started; /* all messages were valid once, or had the time to become so */
     bool may_start;   /* the request has been off since start-up or the last charge */
     soc_t soc;

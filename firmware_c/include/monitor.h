@@ -34,10 +34,11 @@ typedef enum {
     FAULT_CORRUPTED_FRAMES = 16, /* frames refused by the end-to-end check */
     FAULT_DECISION_INVALID = 17, /* the decision is not a number */
     FAULT_CALIBRATION = 18, /* calibration missing or damaged */
-    FAULT_SURFACE_DEFICIT = 19 /* surface reads colder than the heat allows */
+    FAULT_SURFACE_DEFICIT = 19, /* surface reads colder than the heat allows */
+    FAULT_OUT_OF_STEP = 20 /* control periods are longer than those of the measurements */
 } fault_t;
 
-#define FAULT_COUNT 20
+#define FAULT_COUNT 21
 #define FAULT_NONE 255
 
 typedef struct {

@@ -322,9 +322,21 @@ static void queue_frames(bms_t *bms)
     bms->outbox_next = 0u;
 }
 
+/* Only a charge counts on its periods, and only what has passed since it began. */
+static void follow_pace(bms_t *bms)
+{
+    if (is_charging(bms)) {
+        pace_step(&bms->pace, bms->network.measured_periods);
+    } else {
+        bms->pace = (pace_t){ 0 };
+    }
+    bms->network.measured_periods = 0u;
+}
+
 void bms_step(bms_t *bms)
 {
     network_step(&bms->network);
+    follow_pace(bms);
     if (bms->calibration != NULL) {
         run_period(bms);
     } else {

@@ -19,10 +19,11 @@ const fault_policy_t MONITOR_POLICY[FAULT_COUNT] = {
     [FAULT_OVER_VOLTAGE] = { 2u, true, 3u },
     [FAULT_CORE_OVER_TEMPERATURE] = { 2u, true, 3u },
     [FAULT_SURFACE_OVER_TEMPERATURE] = { 2u, true, 3u },
-    [FAULT_CORRUPTED_FRAMES] = { 3u, false, 0u },
+    [FAULT_CORRUPTED_FRAMES] = { 3u, false, 5u },
     [FAULT_DECISION_INVALID] = { 2u, true, 0u },
     [FAULT_CALIBRATION] = { 1u, true, 0u },
     [FAULT_SURFACE_DEFICIT] = { 5u, true, 0u },
+    [FAULT_OUT_OF_STEP] = { 1u, true, 0u },
 };
 
 void monitor_reset(monitor_t *monitor)

@@ -133,6 +133,15 @@ NUMERIC_INLINE float least_value_at(const robust_t *f, float u)
     return numeric_smaller(value_at(less_error(f), u), value_at(plus_error(f), u));
 }
 
+/* An end that is no number leaves nothing, and stays: no later end lies beyond it. */
+NUMERIC_INLINE void raise_lower(interval_t *to, float lower_A, rcbf_active_t name)
+{
+    if (!(lower_A <= to->lower_A)) {
+        to->lower_A = (lower_A <= FLT_MAX) ? lower_A : FLT_MAX;
+        to->active = name;
+    }
+}
+
 /* Takes what a function does not admit from an interval. */
 static void narrow(interval_t *to, concave_t f, rcbf_active_t name)
 {
@@ -148,23 +157,16 @@ static void narrow(interval_t *to, concave_t f, rcbf_active_t name)
         lower_A = (first < second) ? first : second;
         upper_A = (first < second) ? second : first;
     }
-    if (lower_A > to->lower_A) {
-        to->lower_A = lower_A;
-        to->active = name;
-    }
-    if (upper_A < to->upper_A) {
-        to->upper_A = upper_A;
+    raise_lower(to, lower_A, name);
+    if (!(upper_A >= to->upper_A)) {
+        to->upper_A = (upper_A >= -FLT_MAX) ? upper_A : -FLT_MAX;
     }
 }
 
 /* The end of what a line that rises with u admits. */
 NUMERIC_INLINE void narrow_by_line(interval_t *to, line_t f, rcbf_active_t name)
 {
-    const float lower_A = -f.constant / f.linear;
-    if (lower_A > to->lower_A) {
-        to->lower_A = lower_A;
-        to->active = name;
-    }
+    raise_lower(to, -f.constant / f.linear, name);
 }
 
 /* Narrows by both functions of a constraint with an error term, but for those that leave all.

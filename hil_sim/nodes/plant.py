@@ -9,7 +9,7 @@ from operator import itemgetter
 from typing import NamedTuple
 
 from bms.errors import BusError
-from bms.firmware import Reception, ReceptionCounts
+from bms.firmware import ReceptionCounts
 from hil_sim.bus import catalog
 from hil_sim.bus.buses import CanBus, Frame, ecu_remedy, is_serial_line
 from hil_sim.bus.catalog import Message
@@ -18,6 +18,7 @@ from hil_sim.bus.fault_bits import FaultBits
 from hil_sim.bus.identity import Identity
 from hil_sim.bus.wire import Decoder, Listener, Publisher
 from hil_sim.logs.recorder import Recorder
+from hil_sim.nodes.commands import CommandReceiver
 from hil_sim.nodes.turns import MOST_FRAMES, StampedFrame, Turn
 from hil_sim.plant.sensors import Readings
 
@@ -71,12 +72,13 @@ class Answer:
         self,
         values: Sequence[float],
         places: Mapping[str, int],
-        is_command_usable: bool,
+        usable_command_A: float | None,
         latched_faults: int | None,
     ) -> None:
         """Values in the order of `places`, NaN where nothing was said."""
         self._values, self._places = values, places
-        self._is_command_usable = is_command_usable
+        self.usable_command_A = usable_command_A
+        """Current in A that a charger may supply; None without a command of a valid message."""
         self.latched_faults = latched_faults
         """Bit n for fault n; None where the ECU said nothing."""
 
@@ -92,11 +94,6 @@ class Answer:
     def command_A(self) -> float | None:
         """Commanded current in A."""
         return self.value("CommandCurrent")
-
-    @property
-    def usable_command_A(self) -> float | None:
-        """Commanded current in A that a charger may use: the message is valid, not only intact."""
-        return self.command_A if self._is_command_usable else None
 
     @property
     def state(self) -> str | None:
@@ -148,7 +145,7 @@ class PlantNode:
             self._places[signal.name] = len(self._places)
         self._checked: Frame | None = None
         self._checked_counter: int | None = None
-        self._reception = Reception(self._command_id)
+        self._commands = CommandReceiver(command)
         self._faults = FaultBits()
         self._foreign_version: str | None = None
         self._last_counter: int | None = None
@@ -158,7 +155,7 @@ class PlantNode:
     @property
     def command_counts(self) -> ReceptionCounts:
         """Charge commands that were not as they should be."""
-        return self._reception.counts
+        return self._commands.counts
 
     def wait(self) -> None:
         """Return when the next period is due; at once in virtual time."""
@@ -200,6 +197,9 @@ class PlantNode:
                 sent_s, heard = self._publish(period, frames), []
             listened = self._turn.answers(self._bus, period, self._is_last)
             heard += listened
+            if listened and self._turn.sync:
+                # What somebody else says ahead of the ECU must not hide what the ECU says.
+                heard += self._late_frames(period)
             if not self._is_connected:
                 self._note_version([frame for _, frame in listened])
                 self._is_connected = any(self._is_last(frame) for _, frame in heard)
@@ -282,10 +282,10 @@ class PlantNode:
     def _answer(self, heard: list[Frame]) -> Answer:
         values, command = self._listener.hear(heard), self._silent_command
         for frame in heard:
-            if frame.frame_id == self._command_id and self._reception.check(frame.data):
+            if frame.frame_id == self._command_id and self._commands.check(frame.data):
                 command = self._command.values(frame.data)
-        is_usable = self._reception.end_period()
-        answer = Answer(values + command, self._places, is_usable, None)
+        answer = Answer(values + command, self._places, None, None)
+        answer.usable_command_A = self._commands.end_period(answer.command_A)
         self._faults.take(answer.value)
         if answer.value("LatchedFaults") is not None:
             answer.latched_faults = self._faults.latched

@@ -37,6 +37,7 @@ NETWORK, PROTECTION = "tests/firmware/test_supervision.py", "tests/firmware/test
 PLANNED = "tests/firmware/test_planner.py"
 PLANNED_FAMILY = "tests/firmware/test_planner_family.py"
 SMOOTH = "tests/firmware/test_smooth_command.py"
+NO_NUMBER, PACE = "tests/firmware/test_no_number.py", "tests/firmware/test_pace.py"
 MARGINS = "names_the_constraint"
 
 MUTANTS = [
@@ -49,6 +50,9 @@ MUTANTS = [
     Mutant("an empty interval gives 0 A", "rcbf.c", "decision.feasible ? interval.lower_A : 0.0f", "interval.lower_A", DECISION, "infeasible"),
     Mutant("a constraint that may decide is solved", "rcbf.c", "#define CLEARLY 1e-5f", "#define CLEARLY -1e-2f", DECISION, "just_decides"),
     Mutant("not a number is refused", "rcbf.c", "if (!is_physical(input))", "if (input->reference_current_A > 0.0f)", DECISION, "no_number"),
+    Mutant("an end that is no number leaves nothing", "rcbf.c", "if (!(lower_A <= to->lower_A))", "if (lower_A > to->lower_A)", NO_NUMBER),
+    Mutant("an end that is no number stays", "rcbf.c", "(lower_A <= FLT_MAX) ? lower_A : FLT_MAX", "lower_A", NO_NUMBER),
+    Mutant("steps are held against the measurements", "pace.c", "((int32_t)measured_periods - 1)", "0", PACE, "one_more"),
     Mutant("extrapolation is flagged", "kan.c", "in_domain = false;", "in_domain = true;", ESTIMATE, "flagged"),
     Mutant("combinations never seen are flagged", "kan.c", "!is_in_slabs(model, nodes)", "false", ESTIMATE, "combination"),
     Mutant("filters are trusted only when settled", "history.c", "history->periods >= model->settling_periods", "history->periods >= 0u", HISTORY, "init_until"),
