@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bms.cell import Disturbance, integrate_step, polarisation_after_V, terminal_voltage_V
+from bms.cell import (
+    Disturbance,
+    cell_heat_W,
+    integrate_step,
+    polarisation_after_V,
+    terminal_voltage_V,
+)
 from bms.presets import Preset
 from bms.presets.schema import Limits
 from hil_sim.plant.disturbances import Source, core_growth
@@ -23,6 +29,12 @@ class Extremes:
     soc: float
     min_anode_potential_V: float | None = None
     """Least, where the plant has electrodes: lithium plates below 0."""
+    heat_J: float | None = None
+    """Not an extreme: heat that the cell has produced so far, where the plant knows it."""
+
+    def add_heat(self, heat_W: float, duration_s: float) -> None:
+        """A constant heat flow in W has lasted for some time."""
+        self.heat_J = (self.heat_J or 0.0) + heat_W * duration_s
 
     def violations(self, limits: Limits) -> list[str]:
         """Each limit that was exceeded, by however little, as text with both figures."""
@@ -101,6 +113,10 @@ class Plant:
         """Hold the present current for one control period."""
         current_A, cell, extremes = self.current_A, self._cell, self.extremes
         step_s, cooling_W = self._step_s, self.cooling_power_W
+        extremes.add_heat(
+            float(cell_heat_W(cell, self.state, current_A, self.polarisation_V)),
+            SUB_STEPS * step_s,
+        )
         growth = core_growth(self._bounds, current_A, self._reference_A)
         is_plain = cell.resistance is None and not cell.branches
         before = _grown(self._knot, growth)
