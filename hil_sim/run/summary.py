@@ -117,9 +117,7 @@ def first_derate_s(series: TimeSeries) -> float | None:
 def mean_core_temperature_K(series: TimeSeries) -> float | None:
     """Mean over the control periods of the charge, None without any."""
     cores_K = [
-        core_K
-        for time_s, core_K in zip(series.time_s, series.core_temperature_K)
-        if time_s >= 0.0
+        core_K for time_s, core_K in zip(series.time_s, series.core_temperature_K) if time_s >= 0.0
     ]
     return math.fsum(cores_K) / len(cores_K) if cores_K else None
 

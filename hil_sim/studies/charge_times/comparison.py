@@ -118,11 +118,11 @@ def content_json(rows: Sequence[Compared]) -> dict[str, Any]:
             for row in rows
         ],
         "controllers": {
-            name: {"title": RIVALS[name].title, "certified": RIVALS[name].is_certified}
+            name: {"title": RIVALS[name].title, "is_certified": RIVALS[name].is_certified}
             | summed_up(rows, name)
             for name in names
         },
-        "certified_are_safe": certified_are_safe(rows),
+        "passed": certified_are_safe(rows),
     }
 
 

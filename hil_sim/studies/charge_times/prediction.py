@@ -1,4 +1,4 @@
-"""Does the time to full that the firmware tells come true, and the time that it is asked to keep?"""
+"""Does the time to full that the firmware tells come true, and a time that it is asked to keep?"""
 
 from __future__ import annotations
 
@@ -42,18 +42,29 @@ class Listener:
             self._told.append((float(charge.fields.time_s), predicted_s))
 
     def worst_error(self, full_after_s: float) -> float | None:
-        """Largest error of what was left, from FROM_S on; None where nothing was told then."""
+        """Largest error over what was left, from FROM_S on; None where nothing was told then."""
         return worst_error(self._told, full_after_s)
+
+    def worst_share(self, full_after_s: float) -> float | None:
+        """The same over the time of the whole charge."""
+        errors = _errors_s(self._told, full_after_s)
+        return max(errors) / full_after_s if errors else None
 
 
 def worst_error(told: Sequence[tuple[float, float]], full_after_s: float) -> float | None:
     """Largest error of predictions (time, time to full, both in s) over what was truly left."""
-    errors = [
-        max(abs(predicted_s - (full_after_s - time_s)) - STEP_S, 0.0) / (full_after_s - time_s)
+    left_s = [full_after_s - time_s for time_s, _ in told if FROM_S <= time_s < full_after_s]
+    errors = [error / left for error, left in zip(_errors_s(told, full_after_s), left_s)]
+    return max(errors) if errors else None
+
+
+def _errors_s(told: Sequence[tuple[float, float]], full_after_s: float) -> list[float]:
+    """Beyond the signal's step, of what was told from FROM_S on."""
+    return [
+        max(abs(predicted_s - (full_after_s - time_s)) - STEP_S, 0.0)
         for time_s, predicted_s in told
         if FROM_S <= time_s < full_after_s
     ]
-    return max(errors) if errors else None
 
 
 @dataclass(frozen=True)

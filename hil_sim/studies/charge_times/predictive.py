@@ -9,7 +9,7 @@ and the charger's ramp, less MARGINS for what happens between its samples.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import expm

@@ -1,10 +1,11 @@
-"""The comparison as text: a row a start, a row a controller, and the same as CSV."""
+"""The comparison as text: a row a start, a row a controller, and the same as CSV; predictions."""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Mapping
+from statistics import median
 from typing import Any
 
 from bms.text_table import Cell, TextTable, red
@@ -100,7 +101,9 @@ def crossed_limits(charge: Mapping[str, Any]) -> list[str]:
     """The limits that a charge of the JSON crossed."""
     return [
         limit
-        for limit, name in zip(LIMITS, ("core_over_K", "surface_over_K", "voltage_over_V", "soc_over"))
+        for limit, name in zip(
+            LIMITS, ("core_over_K", "surface_over_K", "voltage_over_V", "soc_over")
+        )
         if charge[name] > 0.0
     ]
 
@@ -126,3 +129,105 @@ def csv_text(content: Mapping[str, Any]) -> str:
         start = {name: row[name] for name in start_names}
         writer.writerows(start | charge for charge in row["charges"])
     return text.getvalue()
+
+
+PREDICTION_HEADINGS = ("start", "full after", "worst error of what is left", "within 5 %")
+
+
+def prediction_cells(row: Mapping[str, Any]) -> list[str]:
+    """A start of prediction.prediction_json below PREDICTION_HEADINGS."""
+    time_s, error = row["charge_time_s"], row["worst_error"]
+    return [
+        start_text(row),
+        "–" if time_s is None else f"{time_s:.1f} s",
+        "–" if error is None else f"{100.0 * error:.1f} %",
+        "yes" if row["came_true"] else "no",
+    ]
+
+
+def prediction_table(content: Mapping[str, Any]) -> TextTable:
+    """The worst predicted time to full of each fastest charge."""
+    table = TextTable(
+        *PREDICTION_HEADINGS, title="predicted time to full, from the second minute on"
+    )
+    for row in content["starts"]:
+        table.add_row(*prediction_cells(row))
+    return table
+
+
+ASKED_HEADINGS = (
+    "asked for, over physics' bound",
+    "charges",
+    "in reach",
+    "worst error of those",
+    "kept, and cooler than the fastest",
+    "cooler by, median",
+)
+
+
+def asked_rows(content: Mapping[str, Any]) -> list[list[str]]:
+    """A row below ASKED_HEADINGS for each time that was asked for."""
+    asked = [one for row in content["starts"] for one in row["asked"]]
+    rows = []
+    for over in dict.fromkeys(one["over_optimum"] for one in asked):
+        own = [one for one in asked if one["over_optimum"] == over]
+        reached = [one for one in own if one["is_in_reach"]]
+        errors = [
+            float("inf")
+            if one["charge_time_s"] is None
+            else abs(one["charge_time_s"] / one["asked_s"] - 1.0)
+            for one in reached
+        ]
+        cooler_K = [
+            one["fastest_max_core_temperature_K"] - one["max_core_temperature_K"] for one in reached
+        ]
+        rows.append(
+            [
+                f"{over:.2f}",
+                str(len(own)),
+                str(len(reached)),
+                f"{100.0 * max(errors):.2f} %" if errors else "–",
+                str(sum(one["is_met"] for one in reached)),
+                f"{median(cooler_K):.2f} K" if cooler_K else "–",
+            ]
+        )
+    return rows
+
+
+def asked_table(content: Mapping[str, Any]) -> TextTable:
+    """Times that were asked for, and whether they were kept."""
+    table = TextTable(*ASKED_HEADINGS, title="full by a time")
+    for row in asked_rows(content):
+        table.add_row(*row)
+    return table
+
+
+FAMILY_HEADINGS = ("of the cells of a family", "median", "worst")
+
+
+def family_rows(content: Mapping[str, Any]) -> list[list[str]]:
+    """Rows below FAMILY_HEADINGS."""
+    truly, said = (
+        content[f"{time}_over_optimum_time_s"] for time in ("full_after_s", "charge_time_s")
+    )
+    errors = [row["worst_error"] for row in content["charges"] if row["worst_error"] is not None]
+    return [
+        ["truly full, over physics' bound of the cell", *map(ratio_text, truly.values())],
+        ["said to be full, over the same", *map(ratio_text, said.values())],
+        [
+            "worst error of what is left, over the time of the charge",
+            *(f"{100.0 * error:.0f} %" for error in (median(errors), max(errors))),
+        ]
+        if errors
+        else ["worst error of what is left, over the time of the charge", "–", "–"],
+        ["unsafe or not complete", f"{content['unsafe']} of {content['cells']}", ""],
+        ["predicted within 20 %", f"{content['came_true']} of {content['cells']}", ""],
+    ]
+
+
+def family_table(content: Mapping[str, Any]) -> TextTable:
+    """What the drawn cells come to."""
+    table = TextTable(*FAMILY_HEADINGS, title=f"{content['preset']}, {content['cells']} cells")
+    for row in family_rows(content):
+        table.add_row(*row)
+    return table
