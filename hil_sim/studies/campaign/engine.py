@@ -116,7 +116,8 @@ class CampaignCharge:
     def mean_core_temperature_K(self) -> float:
         """Mean over the control periods of the charge so far."""
         fields = self.fields
-        return float(fields.core_sum_K) / max(fields.periods - fields.edge_period, 1)
+        periods: int = max(fields.periods - fields.edge_period, 1)
+        return float(fields.core_sum_K) / periods
 
     @property
     def is_over(self) -> bool:

@@ -16,7 +16,8 @@ from hil_sim.run.workforce import Workforce
 from hil_sim.studies.charge_times.controllers import RIVALS, Played, play
 from hil_sim.studies.charge_times.starts import Start
 
-T, R = TypeVar("T"), TypeVar("R")
+T = TypeVar("T")
+R = TypeVar("R")
 LIMITS = ("core", "surface", "voltage", "soc")
 BOUNDS = ("optimum_time_s", "lower_bound_s")
 """By physics alone, and with ramp and map: the names that `bms sil` has for them."""

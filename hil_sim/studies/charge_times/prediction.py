@@ -1,4 +1,4 @@
-"""Does the time to full that the firmware tells come true, and a time that it is asked to keep?"""
+"""Does the time to full that the firmware tells come true, and one that it is asked for?"""
 
 from __future__ import annotations
 
