@@ -104,9 +104,15 @@ def test_an_error_of_a_prediction_counts_from_the_second_minute_and_beyond_the_s
 
 @pytest.mark.parametrize(
     ("time_s", "core_K", "met"),
-    [(100.99, 319.9, True), (99.01, 319.9, True), (101.01, 319.9, False), (98.99, 319.9, False), (100.0, 320.0, False),
-     (None, 310.0, False)],
-)  # fmt: skip
+    [
+        (100.99, 319.9, True),
+        (99.01, 319.9, True),
+        (101.01, 319.9, False),
+        (98.99, 319.9, False),
+        (100.0, 320.0, False),
+        (None, 310.0, False),
+    ],
+)
 def test_a_time_is_kept_to_one_per_cent_and_cooler_than_the_fastest(time_s, core_K, met):
     assert Asked(1.5, 100.0, time_s, core_K, 90.0, 320.0).is_met is met
 
