@@ -23,7 +23,7 @@ from bms.model.pair import check_pair
 from bms.presets import Preset
 from bms.tables.network_tables import network_tables
 
-LAYOUT = 4
+LAYOUT = 5
 """Layout number of bms_calibration_t that this module fills (BMS_CALIBRATION_LAYOUT)."""
 MAX_OCV_POINTS = 64
 

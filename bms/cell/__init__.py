@@ -10,7 +10,7 @@ from bms.cell.model import (
     terminal_voltage_V,
 )
 from bms.cell.parameters import CellParameters, OpenCircuitVoltage
-from bms.cell.polarisation import Polarisation, at_rest_V, cell_heat_W, polarisation_after_V
+from bms.cell.polarisation import Polarisation, at_rest_V, polarisation_after_V
 from bms.cell.scaling import CellFactors, scaled
 from bms.cell.tables import Branch, EntropyTable, ResistanceTable
 
@@ -26,7 +26,6 @@ __all__ = [
     "Polarisation",
     "ResistanceTable",
     "at_rest_V",
-    "cell_heat_W",
     "integrate_step",
     "ohmic_resistance_ohm",
     "polarisation_after_V",

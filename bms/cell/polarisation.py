@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from bms.cell.model import CellState, ohmic_resistance_ohm
 from bms.cell.parameters import CellParameters
 
 Polarisation = tuple[Any, ...]
@@ -38,18 +37,6 @@ def polarisation_heat_W(cell: CellParameters, polarisation_V: Polarisation) -> A
     for branch, voltage_V in zip(cell.branches, polarisation_V, strict=True):
         heat_W = heat_W + voltage_V * voltage_V / branch.resistance_ohm
     return heat_W
-
-
-def cell_heat_W(
-    cell: CellParameters, state: CellState, current_A: Any, polarisation_V: Polarisation = ()
-) -> Any:
-    """Heat in W that the cell produces: ohmic, reversible and of its branches; floats or arrays."""
-    entropic_V_per_K = (
-        cell.entropic_coefficient_V_per_K if cell.entropy is None else cell.entropy(state.soc)
-    )
-    ohm = ohmic_resistance_ohm(cell, state.core_temperature_K, state.soc)
-    lost_V = ohm * current_A - entropic_V_per_K * state.core_temperature_K
-    return lost_V * current_A + polarisation_heat_W(cell, polarisation_V)
 
 
 def at_rest_V(cell: CellParameters) -> Polarisation:

@@ -52,6 +52,8 @@ typedef struct {
     bool may_start;   /* the request has been off since start-up or the last charge */
     soc_t soc;
     bool soc_known;
+    uint8_t ocv_segment; /* of the table, where the last search ended */
+    float open_circuit_voltage_V; /* of one cell's state of charge, where that is known */
     history_t history;
     thermal_t thermal;
     float coolant_temperature_K; /* last usable reading */

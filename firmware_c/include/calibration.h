@@ -16,7 +16,7 @@ extern "C" {
 #endif
 
 /* Raised whenever the layout of bms_calibration_t or of one of its parts changes. */
-#define BMS_CALIBRATION_LAYOUT 4
+#define BMS_CALIBRATION_LAYOUT 5
 
 typedef struct {
     float low;

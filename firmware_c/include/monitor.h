@@ -43,6 +43,7 @@ typedef enum {
 typedef struct {
     uint8_t lasted[FAULT_COUNT];    /* periods without a break, saturating */
     uint16_t returned[FAULT_COUNT]; /* MONITOR_RETURN_PERIODS a time, less those since */
+    uint32_t counting;           /* bit n: a count of fault n above is not 0 */
     uint32_t active;             /* bit n: symptom n seen in this period */
     uint32_t latched;            /* bit n: fault n stands until monitor_reset */
     uint8_t first;               /* fault that latched first, or FAULT_NONE */

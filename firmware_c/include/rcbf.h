@@ -103,6 +103,10 @@ float rcbf_open_circuit_voltage_near_V(const rcbf_constants_t *constants, float 
  * above 0 A (RCBF_INVALID). */
 rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t *input);
 
+/* The same where the open-circuit voltage of the input's state of charge is known. */
+rcbf_decision_t rcbf_solve_at(const rcbf_constants_t *constants, const rcbf_input_t *input,
+                              float open_circuit_voltage_V);
+
 #ifdef __cplusplus
 }
 #endif

@@ -71,6 +71,14 @@ static float within_box(const kan_model_t *model, uint32_t input, float value, f
     return ((value > high) && (value <= high + error)) ? high : value;
 }
 
+static void look_up_voltage(bms_t *bms)
+{
+    if (!has_family(bms)) {
+        bms->open_circuit_voltage_V = rcbf_open_circuit_voltage_near_V(
+            &bms->calibration->rcbf, bms->soc.soc, &bms->ocv_segment);
+    }
+}
+
 static void update_estimates(bms_t *bms)
 {
     const codec_measurement_t *m = &bms->measurement;
@@ -108,6 +116,7 @@ static void update_estimates(bms_t *bms)
         const float commanded_A = is_charging(bms) ? bms->command_A : current_A;
         soc_count(&bms->soc, current_A, commanded_A, calibration->sampling_period_s,
                   calibration->rcbf.capacity_As);
+        look_up_voltage(bms);
     }
 }
 
@@ -128,6 +137,7 @@ static void follow_request(bms_t *bms, uint32_t symptoms)
         }
     } else if ((bms->state == BMS_STANDBY) && bms->may_start && (symptoms == 0u)) {
         soc_set(&bms->soc, bms->measurement.plug_in_soc);
+        look_up_voltage(bms);
         if (has_family(bms)) {
             const family_reading_t reading = reading_of(bms);
             family_begin(&bms->family, &bms->calibration->family, &bms->calibration->rcbf,
@@ -179,13 +189,14 @@ static void decide(bms_t *bms)
     } else if (is_charging(bms)) {
         const rcbf_input_t input = {
             .soc = bms->soc.soc,
-            .core_temperature_K = { .high_K = bms->estimate.core_temperature_K },
-            .surface_temperature_K = { .high_K = bms->surface_temperature_K },
-            .coolant_temperature_K = { .high_K = m->coolant_temperature_K },
+            .core_temperature_K = { bms->estimate.core_temperature_K, 0.0f },
+            .surface_temperature_K = { bms->surface_temperature_K, 0.0f },
+            .coolant_temperature_K = { m->coolant_temperature_K, 0.0f },
             .cooling_power_W = m->cooling_power_W,
             .reference_current_A = wanted_current_A(bms),
         };
-        bms->decision = rcbf_solve(&calibration->rcbf, &input);
+        bms->decision =
+            rcbf_solve_at(&calibration->rcbf, &input, bms->open_circuit_voltage_V);
         bms->state = (bms->decision.active == RCBF_NONE) ? BMS_CHARGING : BMS_DERATED;
     }
 }
@@ -261,22 +272,22 @@ static void queue_frames(bms_t *bms)
         .planned_A = -bms->planner.planned_A,
         .predicted_time_to_full_s = bms->planner.time_to_full_s,
     };
-    bms->outbox_length = 0u;
-    bms->outbox_next = 0u;
+    can_frame_t *frame = bms->outbox;
     for (uint32_t i = 0u; i < CAN_TRANSMITTED_COUNT; i++) {
         const bool is_due = (bms->periods % CAN_TRANSMITTED[i].every_periods) == 0u;
         if (!is_due || (CAN_TRANSMITTED[i].is_optional && !bms_has_planned_mode(bms))) {
             continue;
         }
-        can_frame_t *frame = &bms->outbox[bms->outbox_length];
         codec_write(i, &report, frame);
         if (CAN_TRANSMITTED[i].is_protected) {
             e2e_protect(frame->data, frame->length, CAN_TRANSMITTED[i].data_ids,
                         bms->counters[i]);
             bms->counters[i]++;
         }
-        bms->outbox_length++;
+        frame++;
     }
+    bms->outbox_length = (uint32_t)(frame - bms->outbox);
+    bms->outbox_next = 0u;
 }
 
 void bms_step(bms_t *bms)

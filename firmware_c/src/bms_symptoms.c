@@ -41,8 +41,8 @@ static bool voltage_deviates(const bms_t *bms)
         return !family_voltage_is_plausible(&bms->family, &calibration->family, cell, &reading,
                                             deviation_V);
     }
-    const float model_V = rcbf_open_circuit_voltage_V(cell, bms->soc.soc) -
-                          m->current_A * cell->ohmic_resistance_ohm;
+    const float model_V =
+        bms->open_circuit_voltage_V - m->current_A * cell->ohmic_resistance_ohm;
     return numeric_abs(m->voltage_V - model_V) > deviation_V;
 }
 

@@ -9,11 +9,14 @@ void network_receive(network_t *network, const can_frame_t *frame,
 {
     for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
         const codec_message_t *message = &CAN_RECEIVED[i];
-        if ((frame->id == message->id) &&
-            (e2e_check(&network->receivers[i], frame->data, frame->length, message->length,
-                       message->data_ids, message->policy.max_delta_counter) == E2E_OK)) {
+        if (frame->id != message->id) {
+            continue;
+        }
+        if (e2e_check(&network->receivers[i], frame->data, frame->length, message->length,
+                      message->data_ids, message->policy.max_delta_counter) == E2E_OK) {
             codec_read(i, frame->data, measurement);
         }
+        return; /* no two messages have one identifier */
     }
 }
 

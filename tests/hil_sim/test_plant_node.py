@@ -147,6 +147,29 @@ def test_a_masquerade_with_a_frozen_counter_does_not_make_commands_late(database
     assert own >= 40
 
 
+@pytest.mark.parametrize("ahead", [0, 1], ids=["before the ECU's own", "after it, for the next"])
+def test_after_one_command_that_passes_for_the_ecus_the_next_is_that_of_its_own_period(
+    database, ahead
+):
+    """Intact and with the right counter at the right moment: it is obeyed once, and delays none."""
+    codec = database["ChargeCommand"]
+
+    def serve(wire):
+        period = len(wire.heard)
+        counter = (PERIODS_TO_TRUST + period - 1 + ahead) % COUNTER_MODULUS
+        forged = Frame(codec.frame_id, codec.encode({"CommandCurrent": -20.0}, counter))
+        own = wire._command.frame({"CommandCurrent": -0.1 * period})
+        both = [own, forged] if ahead else [forged, own]
+        wire.far.send(*(both if period == 2 else [own]))
+
+    with Wire("virtual:forged", database, serve) as wire:
+        wire.trusted()
+        commands_A = [wire.exchange().usable_command_A for _ in range(20)]
+    expected_A = [-0.1 * period for period in range(1, 21)]
+    expected_A[1 + ahead] = -20.0
+    assert commands_A == pytest.approx(expected_A)
+
+
 def test_an_ecu_that_restarts_is_followed_after_one_wait(database):
     with Wire("virtual:restart", database, lambda wire: wire.command(-1.0)) as wire:
         wire.trusted()

@@ -14,12 +14,12 @@ from bms.calibration import calibration_fields
 from bms.presets import Preset
 from bms.presets.schema import Sensor
 from codegen.can_database import load_database
+from hil_sim.native.cell_fields import cell_fields
 from hil_sim.plant.charger import lag_share
 from hil_sim.plant.sensors import Readings
 from hil_sim.plant.true_cell import COOLING_BAND_K, TrueCell
 from hil_sim.run.charge import OFF_PERIODS, READY_PERIODS, STARTING_PERIODS
 from hil_sim.studies.campaign._runner import ffi, lib
-from hil_sim.studies.campaign.native_cell import cell_fields
 from hil_sim.studies.campaign.nominal import nominal_fields
 from hil_sim.studies.campaign.settings import CampaignSettings
 

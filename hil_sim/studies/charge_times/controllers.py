@@ -102,7 +102,7 @@ def _played(name: str, preset: Preset, result: RunResult) -> Played:
 
 
 def _played_in_c(name: str, preset: Preset, charge: CampaignCharge) -> Played:
-    fields, peaks = charge.fields, charge.fields.peaks
+    fields, peaks = charge.fields, charge.fields.peaks.cell
     return _over_limits(
         preset,
         controller=name,

@@ -146,7 +146,7 @@ class _FullWatch:
 
 
 def _crossed(preset: Preset, charge: CampaignCharge) -> tuple[str, ...]:
-    limits, peaks = preset.limits, charge.fields.peaks
+    limits, peaks = preset.limits, charge.fields.peaks.cell
     overs = {
         "core": peaks.core_temperature_K - limits.max_core_temperature_K,
         "surface": peaks.surface_temperature_K - limits.max_surface_temperature_K,

@@ -127,9 +127,9 @@ def foretell(start: Start) -> Foretold:
                 over,
                 asked_s,
                 _full_after_s(charge),
-                charge.fields.peaks.core_temperature_K,
+                charge.fields.peaks.cell.core_temperature_K,
                 fastest_s,
-                fastest.fields.peaks.core_temperature_K,
+                fastest.fields.peaks.cell.core_temperature_K,
             )
         )
     worst = None if fastest_s is None else listener.worst_error(fastest_s)

@@ -56,10 +56,7 @@ typedef struct {
 
 /* Largest values of a charge, at any sub-step. */
 typedef struct {
-    double core_temperature_K;
-    double surface_temperature_K;
-    double voltage_V;
-    double soc;
+    cell_peaks_t cell;
     double estimate_error_K;     /* of the firmware, while charging, at the control periods */
     cell_state_t model_error;    /* |true less nominal rates|, disturbance included */
     double surface_error_slope_K_per_s2;
