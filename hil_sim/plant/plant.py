@@ -26,6 +26,12 @@ class Extremes:
     soc: float
     min_anode_potential_V: float | None = None
     """Least, where the plant has electrodes: lithium plates below 0."""
+    heat_J: float | None = None
+    """Not an extreme: heat that the cell has produced so far, where the plant knows it."""
+
+    def add_heat(self, heat_W: float, duration_s: float) -> None:
+        """A constant heat flow in W has lasted for some time."""
+        self.heat_J = (self.heat_J or 0.0) + heat_W * duration_s
 
     def violations(self, limits: Limits) -> list[str]:
         """Each limit that was exceeded, by however little, as text with both figures."""
@@ -62,6 +68,8 @@ class Plant:
         self._bounds = preset.uncertainty
         self._reference_A = preset.limits.reference_current_A
         step_s = preset.timing.sampling_period_s / SUB_STEPS
+        self._period_s = preset.timing.sampling_period_s
+        self._heat_J = 0.0
         self._cell = ffi.new("cell_t *", cell_fields(true_cell.cell, step_s))
         self._memory = ffi.new(
             "cell_memory_t *",
@@ -86,7 +94,11 @@ class Plant:
         """Largest true values at any sub-step so far."""
         peaks = self._peaks
         return Extremes(
-            peaks.core_temperature_K, peaks.surface_temperature_K, peaks.voltage_V, peaks.soc
+            peaks.core_temperature_K,
+            peaks.surface_temperature_K,
+            peaks.voltage_V,
+            peaks.soc,
+            heat_J=self._heat_J,
         )
 
     @property
@@ -116,6 +128,10 @@ class Plant:
         self._knots[0 : len(self._knots)] = [
             value for knot in islice(self._source, SUB_STEPS) for value in knot
         ]
+        memory = self._memory
+        heat_W = lib.cell_heat_W(self._cell, ffi.addressof(memory.state), current_A)
+        heat_W += lib.cell_polarisation_heat_W(self._cell, memory.polarisation_V)
+        self._heat_J += heat_W * self._period_s
         lib.cell_hold(
             self._cell,
             self._memory,

@@ -58,6 +58,9 @@ class Scenario:
                 "period_s": preset.timing.sampling_period_s,
                 "max_time_s": settings.max_time_s,
                 "reference_current_A": preset.limits.reference_current_A,
+                "has_mode": settings.mode is not None,
+                "mode": settings.mode or 0,
+                "full_by_s": -1.0,
                 "completion_soc": preset.limits.completion_soc,
                 "cooling_band_K": COOLING_BAND_K,
                 "noise_cutoff": Sensor.NOISE_CUTOFF,
@@ -108,6 +111,13 @@ class CampaignCharge:
             },
         )
         lib.charge_begin(self.fields, scenario.calibration)
+
+    @property
+    def mean_core_temperature_K(self) -> float:
+        """Mean over the control periods of the charge so far."""
+        fields = self.fields
+        periods: int = max(fields.periods - fields.edge_period, 1)
+        return float(fields.core_sum_K) / periods
 
     @property
     def is_over(self) -> bool:

@@ -41,6 +41,7 @@ void charge_begin(charge_t *charge, const bms_calibration_t *calibration)
     bms_init(&charge->link.bms, &config);
     charge->outcome = CHARGE_RUNNING;
     charge->first_derate_s = -1.0;
+    charge->predicted_s = -1.0;
     charge->first_fault = FAULT_NONE;
     charge->surface_error_K_per_s = NAN;
     charge->differences = differences_of(&charge->cell, &charge->scenario->nominal);
@@ -94,9 +95,21 @@ static void note_firmware(charge_t *charge, uint32_t state)
 static link_answer_t ask_firmware(charge_t *charge, const double readings[LINK_READINGS])
 {
     const charge_scenario_t *scenario = charge->scenario;
+    const double run_s =
+        charge->requested ? (double)(charge->periods - charge->edge_period) * scenario->period_s
+                          : 0.0;
+    const bool has_time = scenario->full_by_s >= 0.0;
+    const link_request_t asked = {
+        .charge = charge->requested,
+        .reference_current_A = scenario->reference_current_A,
+        .plug_in_soc = charge->plug_in_soc,
+        .has_mode = scenario->has_mode,
+        .mode = scenario->mode,
+        .time_to_full_s = has_time ? fmax(scenario->full_by_s - run_s, 0.0) : -1.0,
+    };
     const link_answer_t answer =
-        link_exchange(&charge->link, &scenario->signals, readings, charge->requested,
-                      scenario->reference_current_A, charge->plug_in_soc);
+        link_exchange(&charge->link, &scenario->signals, readings, &asked);
+    charge->predicted_s = answer.predicted_s;
     note_firmware(charge, answer.state);
     return answer;
 }
@@ -128,7 +141,7 @@ static link_answer_t ask_baseline(charge_t *charge, const double readings[LINK_R
     for (uint32_t i = 0u; i < LINK_READINGS; i++) {
         heard[i] = link_over_the_bus(&signals->readings[i], readings[i]);
     }
-    link_answer_t answer = { true, 0.0, BMS_STANDBY };
+    link_answer_t answer = { true, 0.0, BMS_STANDBY, -1.0 };
     if (charge->requested && is_full(charge, heard[0], heard[1])) {
         answer.state = BMS_COMPLETE;
     } else if (charge->requested) {
@@ -209,6 +222,9 @@ static double core_growth(const charge_t *charge)
 
 static void advance_plant(charge_t *charge, const double *knots)
 {
+    charge->heat_J += (cell_heat_W(&charge->cell, &charge->memory.state, charge->current_A) +
+                       cell_polarisation_heat_W(&charge->cell, charge->memory.polarisation_V)) *
+                      charge->scenario->period_s;
     cell_hold(&charge->cell, &charge->memory, charge->current_A, charge->cooling_power_W,
               core_growth(charge), &charge->knot, knots, CHARGE_SUB_STEPS, &charge->peaks.cell,
               charge->watches_model_error ? note_model_error : NULL, charge);
@@ -245,6 +261,7 @@ static void run_period(charge_t *charge, const double *normals, const double *kn
     supply(charge, &answer);
     if (charge->requested) {
         charge->time_s = (double)(charge->periods - charge->edge_period) * scenario->period_s;
+        charge->core_sum_K += charge->memory.state.core;
         if ((answer.state == BMS_DERATED) && (charge->first_derate_s < 0.0)) {
             charge->first_derate_s = charge->time_s;
         }
