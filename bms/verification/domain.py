@@ -127,6 +127,15 @@ class Domain:
             + self.preset.uncertainty.surface_K_per_s
         )
 
+    @property
+    def chain_reserve_K_per_s(self) -> float:
+        """What the chain that is kept has less than chain_value, besides the disturbance that acts.
+
+        The paper's chain contains the disturbance itself, the other one its worst case, whatever acts.
+        """
+        is_worst_case = self.preset.gains.surface_condition == "worst-case"
+        return 2.0 * self.preset.uncertainty.surface_K_per_s if is_worst_case else 0.0
+
 
 def certified_domain(preset: Preset, condition: Condition, surface_chain: Chain) -> Domain:
     """Domain of a preset for the condition that has to hold in it.

@@ -178,7 +178,7 @@ static void decide(bms_t *bms)
         bms->state = (bms->decision.active == RCBF_NONE) ? BMS_CHARGING : BMS_DERATED;
     } else if (is_charging(bms)) {
         const rcbf_input_t input = {
-            .soc = bms->soc.soc,
+            .soc = bms->soc.soc + calibration->soc_error,
             .core_temperature_K = { .high_K = bms->estimate.core_temperature_K },
             .surface_temperature_K = { .high_K = bms->surface_temperature_K },
             .coolant_temperature_K = { .high_K = m->coolant_temperature_K },

@@ -40,7 +40,8 @@ bool calibration_is_valid(const bms_calibration_t *calibration)
            period_is_valid(calibration->sampling_period_s) &&
            is_positive(-calibration->reference_current_A) &&
            is_positive(calibration->current_growth_A) &&
-           is_positive(calibration->completion_soc) &&
+           is_positive(calibration->completion_soc) && (calibration->soc_error >= 0.0f) &&
+           numeric_is_finite(calibration->soc_error) &&
            rcbf_constants_are_valid(&calibration->rcbf) &&
            plausibility_is_valid(&calibration->plausibility) &&
            thermal_constants_are_valid(&calibration->thermal) &&
