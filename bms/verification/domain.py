@@ -129,9 +129,9 @@ class Domain:
 
     @property
     def chain_reserve_K_per_s(self) -> float:
-        """What the chain that is kept has less than chain_value, besides the disturbance that acts.
+        """By how much a chain that has the worst disturbance in it is less than chain_value.
 
-        The paper's chain contains the disturbance itself, the other one its worst case, whatever acts.
+        0 for the paper's, which contains the disturbance that acts.
         """
         is_worst_case = self.preset.gains.surface_condition == "worst-case"
         return 2.0 * self.preset.uncertainty.surface_K_per_s if is_worst_case else 0.0

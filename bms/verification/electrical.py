@@ -28,9 +28,10 @@ def certify_voltage(preset: Preset, constants: Mapping[str, Any]) -> tuple[Certi
     """Certificate, and the least distance to the limit in V (infinite where nothing charges).
 
     For counted charge a, the current is what the constraint allows at a and the firmware's reserve;
-    at the end of the hold the true charge is at most a, its error, and what came in meanwhile. The voltage is linear in a
-    between the points where any part of this has a kink, so it is highest at one of them. Where
-    no current is allowed the cell rests, at a charge to which a decision below has brought it.
+    at the end of the hold the true charge is at most a, its error, and what came in meanwhile. The
+    voltage is linear in a between the points where any part of this has a kink, so it is highest at
+    one of them. Where no current is allowed the cell rests, at a charge to which a decision below
+    has brought it.
     """
     cell, ocv, limits = preset.cell, constants["ocv"], preset.limits
     resistance_ohm = constants["ohmic_resistance_ohm"]

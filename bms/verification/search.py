@@ -125,9 +125,7 @@ def simulate_hold(
         surface = -surface
     lowest = _barrier(domain, state, current_A, surface, barrier)
     for length_s in steps_s:
-        after = min(
-            surface + bounds.surface_rate_K_per_s2 * length_s * (1.0 + 1e-12), highest
-        )
+        after = min(surface + bounds.surface_rate_K_per_s2 * length_s * (1.0 + 1e-12), highest)
         state = integrate_step(
             preset.cell, state, current_A, cooling_W, length_s,
             _upward(domain, surface), _upward(domain, after),
