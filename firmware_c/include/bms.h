@@ -26,7 +26,7 @@
 extern "C" {
 #endif
 
-#define BMS_FIRMWARE_VERSION 3
+#define BMS_FIRMWARE_VERSION 4
 #define BMS_TRANSMITTED_MESSAGES 9
 
 typedef enum {
