@@ -13,7 +13,7 @@ static bool range_is_valid(const range_t *range)
 
 static bool is_positive(float value)
 {
-    return (value > 0.0f) && numeric_is_finite(value);
+    return numeric_is_within(value, NUMERIC_LEAST, FLT_MAX);
 }
 
 static bool plausibility_is_valid(const plausibility_t *limits)

@@ -84,7 +84,7 @@ MUTANTS = [
     Mutant("a plan needs numbers", "planner.c", "if (!is_known(&planner->start, &planner->goal))", "if (planner->goal.strongest_A < 0.0f)", PLANNED, "no_number"),
     Mutant("a period's steps are bounded", "planner.c", " && (i < PLANNER_STEPS); i++", "; i++", PLANNED, "takes_no_more"),
     Mutant("the better half is searched on", "planner.c", "inner[0].cost < inner[1].cost", "inner[0].cost > inner[1].cost", PLANNED, "near_the_bound"),
-    Mutant("limits are ridden in the prediction", "planner.c", "weaker(soc_A, weaker(core_A, surface_A))", "soc_A", PLANNED, "comes_true"),
+    Mutant("limits are ridden in the prediction", "planner.c", "numeric_smaller(soc_A, numeric_smaller(core_A, surface_A))", "soc_A", PLANNED, "comes_true"),
     Mutant("the coolant warms up", "planner.c", "row[COOLANT] * planner->temperature_K[COOLANT] +", "row[COOLANT] * planner->start.temperature_K[COOLANT] +", PLANNED, "comes_true or near_the_bound"),
     Mutant("in time is better than soon", "planner.c", "(candidate->strength_A + IN_TIME)", "(IN_TIME - candidate->strength_A)", PLANNED, "by_time"),
     Mutant("the fixed mode is not planned", "bms_plan.c", "((mode == MODE_FASTEST) || (mode == MODE_BY_TIME))", "(mode <= MODE_FIXED)", "tests/firmware/test_charge_mode.py", "fixed"),
