@@ -145,7 +145,7 @@ def test_heat_range_holds_every_heat_of_charging(preset, entropy_V_per_K):
 
 
 def reading(random, preset, state):
-    """The state that decides: every channel off by its bound, either way, the charge at its most."""
+    """The state that decides: every channel off by its bound either way, the charge at its most."""
 
     def off(sensor, bus_step):
         return random.choice([-1.0, 1.0], RUNS) * (sensor.error_bound + bus_step)
