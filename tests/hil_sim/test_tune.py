@@ -69,7 +69,7 @@ def test_a_choice_says_what_its_gains_do():
     own = replace(preset, name="own")
     gains = with_choice(own, Choice(0.1, 2.0, 1.0, 0.25, 1.0)).gains
 
-    assert gains.alpha2_per_s == pytest.approx(2.0 * a1_per_s, rel=1e-3)
+    assert gains.alpha2_per_s == pytest.approx(2.0 * a1_per_s, rel=5e-3)
     larger, smaller = gains.surface_roots_per_s
     assert smaller / (larger + smaller) == pytest.approx(0.25, abs=2e-3)
     assert with_choice(own, Choice(0.1, 1.0, 1.0, 0.25, 1.0)).gains.alpha2_per_s is None
