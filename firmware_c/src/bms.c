@@ -219,15 +219,17 @@ static void decide(bms_t *bms)
         bms->state = (bms->decision.active == RCBF_NONE) ? BMS_CHARGING : BMS_DERATED;
     } else if (is_charging(bms)) {
         const rcbf_input_t input = {
-            .soc = bms->soc.soc,
-            .core_temperature_K = { bms->estimate.core_temperature_K, 0.0f },
-            .surface_temperature_K = { bms->surface_temperature_K, 0.0f },
-            .coolant_temperature_K = { m->coolant_temperature_K, 0.0f },
+            .soc = bms->soc.soc + calibration->soc_error,
+            .core_temperature_K = { .high_K = bms->estimate.core_temperature_K },
+            .surface_temperature_K = { .high_K = bms->surface_temperature_K },
+            .coolant_temperature_K = { .high_K = m->coolant_temperature_K },
             .cooling_power_W = m->cooling_power_W,
             .reference_current_A = wanted_current_A(bms),
         };
         bms->decision = rcbf_solve_steadily(&calibration->rcbf, &input,
-                                            bms->open_circuit_voltage_V, &bms->steadier);
+                                            rcbf_open_circuit_voltage_V(&calibration->rcbf,
+                                                                        input.soc),
+                                            &bms->steadier);
         bms->state = (bms->decision.active == RCBF_NONE) ? BMS_CHARGING : BMS_DERATED;
     }
 }

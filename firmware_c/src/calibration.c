@@ -23,6 +23,7 @@ static const envelope_t ENVELOPE[] = {
     WITHIN(reference_current_A, -3000.0f, -0.001f),
     WITHIN(current_growth_A, 1e-6f, 3000.0f),
     WITHIN(completion_soc, 0.01f, 1.0f),
+    WITHIN(soc_error, 0.0f, 0.5f),
     WITHIN(rcbf.max_core_temperature_K.high_K, 253.0f, 353.0f),
     WITHIN(rcbf.max_surface_temperature_K.high_K, 253.0f, 353.0f),
     WITHIN(rcbf.capacity_As, 1800.0f, 1.08e6f),
