@@ -79,7 +79,7 @@ def _outcome(scenario: Scenario, start: Initial, seed: int, noise: float) -> Out
     knots: Array = np.zeros((_BLOCK_PERIODS * SUB_STEPS, len(CellState._fields)))
     while not charge.is_over:
         charge.advance(noise * random.standard_normal((_BLOCK_PERIODS, 5)), knots)
-    peaks, limits = charge.fields.peaks, preset.limits
+    peaks, limits = charge.fields.peaks.cell, preset.limits
     return Outcome(
         float(charge.fields.time_s) if charge.outcome == "complete" else math.inf,
         (
