@@ -11,10 +11,10 @@ from bms.errors import InputError
 Interval = tuple[float, float]
 
 RADIAL_W_PER_MK: tuple[float, float, float] = (0.2, 0.45, 1.0)
-"""Least, middle, greatest conductivity across the layers of a wound cell in published measurements.
+"""Least, middle, greatest conductivity across the layers of a wound cell.
 
-0.20 W/(m K) for a 18650 and 0.15 for a 26650 by Drake et al. 2014 (J. Power Sources 252), about 0.4
-by Spinner et al. 2015 and 0.67 by Fleckenstein et al. 2013 for others; with electrolyte up to 1.
+Drake et al. 2014 (J. Power Sources 252) measured 0.20 W/(m K) on a 18650; others found more, and
+dry layers less. Assumed wide for a cell that nobody has measured.
 """
 THROUGH_W_PER_MK: tuple[float, float, float] = (0.3, 0.7, 1.5)
 """The same through the layers of a stacked or flat wound cell, where they are pressed together."""
