@@ -57,8 +57,7 @@ SCENARIOS = {
     "cold_start": Scenario(250, temperature_K=278.5, soc=0.05),
     "hot_derating": Scenario(
         350,
-        mode=Mode.FIXED,
-        temperature_K=318.0,
+        temperature_K=321.0,
         soc=0.2,
         disturbance=DisturbanceKind.UPWARD,
     ),
