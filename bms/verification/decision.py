@@ -23,8 +23,7 @@ def decide(
     The interval is empty, lower above upper, where no current is safe.
     """
     k = constants
-    counted, core_K, surface_K, coolant_K = reading
-    soc = counted + k["soc_error"]
+    soc, core_K, surface_K, coolant_K = reading
     voltage_A = (
         -(k["max_voltage_V"] - k["ocv"](soc) - k["voltage_margin_V"]) / k["ohmic_resistance_ohm"]
     )

@@ -6,7 +6,6 @@
  * every instruction, so that ticks are instructions.
  */
 #include <stdbool.h>
-#include <stddef.h>
 #include <stdint.h>
 
 #include "bms.h"
@@ -185,9 +184,8 @@ static bool take_calibration(cost_t *cost, const char *path)
     }
     cost->calibration = &cost->loaded;
     const int32_t file = semihosting_open(path, SEMIHOSTING_READ);
-    const uint32_t length =
-        (file >= 0) ? semihosting_read(file, &cost->loaded, sizeof cost->loaded) : 0u;
-    return (length == offsetof(bms_calibration_t, kan) + kan_model_length(&cost->loaded.kan)) &&
+    return (file >= 0) &&
+           (semihosting_read(file, &cost->loaded, sizeof cost->loaded) == sizeof cost->loaded) &&
            calibration_is_valid(&cost->loaded);
 }
 

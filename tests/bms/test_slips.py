@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 from bms.model.pair import load_pair
-from bms.presets.paper_form import in_paper_form
 from bms.verification import CLASHING_DELTA4, SLIPS, Slip, verify
 from bms.verification.closed_loop import SlipCost, slip_cost
 from bms.verification.conditions import decided_conditions, firmware_constants, required_conditions
@@ -26,8 +25,7 @@ UNSAFE = [
 
 @cache
 def pair(name: str):
-    preset, model = load_pair(name, None)
-    return in_paper_form(preset), model
+    return load_pair(name, None)
 
 
 def constants(name: str, *slips: Slip) -> dict[str, Any]:

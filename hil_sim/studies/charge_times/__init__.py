@@ -1,1 +1,0 @@
-"""How fast each controller charges beside the bound that none can beat, and what it crosses."""
