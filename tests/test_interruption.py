@@ -142,13 +142,11 @@ def child_of(pid):
     return int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[0])
 
 
-@pytest.mark.parametrize(
-    "body",
-    ["import ctypes; ctypes.CDLL(None).sleep(60)", "continue"],
-    ids=["long call of C", "loop that swallows it"],
-)
-def test_what_does_not_end_by_itself_is_ended_with_its_children(body):
-    program = BUSY.format(body=body)
+def interrupted(program):
+    """Interrupts a program when it is ready: exit code, what it said, its child, seconds it took.
+
+    The child holds the same pipes, so they are read to their end only when it has gone too.
+    """
     with subprocess.Popen(
         [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
@@ -158,22 +156,24 @@ def test_what_does_not_end_by_itself_is_ended_with_its_children(body):
         start_s = time.monotonic()
         process.send_signal(signal.SIGINT)
         said = process.communicate(timeout=30.0)
-    assert (process.returncode, said) == (130, ("heard\n", "bms: interrupted\n"))
-    assert time.monotonic() - start_s < END_S + START_S
+    return process.returncode, said, child, time.monotonic() - start_s
+
+
+@pytest.mark.parametrize(
+    "body",
+    ["import ctypes; ctypes.CDLL(None).sleep(60)", "continue"],
+    ids=["long call of C", "loop that swallows it"],
+)
+def test_what_does_not_end_by_itself_is_ended_with_its_children(body):
+    code, said, child, took_s = interrupted(BUSY.format(body=body))
+    assert (code, said) == (130, ("heard\n", "bms: interrupted\n"))
+    assert took_s < END_S + START_S
     with pytest.raises(ProcessLookupError):
         os.kill(child, 0)
 
 
 def test_a_process_that_ends_by_itself_leaves_no_child_behind():
-    with subprocess.Popen(
-        [sys.executable, "-c", UNHANDLED], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
-        child = child_of(process.pid)
-        process.send_signal(signal.SIGINT)
-        # Both ends of a pipe: it is only read to its end when the child has gone too.
-        said = process.communicate(timeout=30.0)
-    assert (process.returncode, said) == (130, ("", ""))
+    code, said, child, _ = interrupted(UNHANDLED)
+    assert (code, said) == (130, ("", ""))
     with pytest.raises(ProcessLookupError):
         os.kill(child, 0)
