@@ -121,7 +121,7 @@ CORE_HEADERS = tuple(
     f"firmware_c/include/{name}.h"
     for name in (
         *("kan", "rcbf", "thermal", "soc", "family", "planner", "calibration", "can_frame"),
-        *("e2e", "codec", "monitor", "history", "network", "request", "bms"),
+        *("e2e", "codec", "monitor", "history", "network", "pace", "request", "bms"),
     )
 )
 FIRMWARE = NativeExtension(

@@ -8,9 +8,10 @@ from typing import Annotated
 import typer
 
 from bms.commands import options
-from bms.errors import InputError
+from bms.errors import InputError, ModelMismatchError
 from bms.image import calibration_part
 from bms.model.pair import load_pair
+from bms.model.start import unknown_start
 from bms.presets import DEFAULT_PRESET
 from codegen.calibration_source import calibration_source
 from codegen.can_sources import can_sources
@@ -47,6 +48,9 @@ def export(
     if out is None and sources is None:
         raise InputError("export: no folder is named; add --out DIR, --sources DIR or both")
     chosen, estimator = load_pair(preset, model)
+    start = unknown_start(chosen, estimator)
+    if start is not None:
+        raise ModelMismatchError(f"--model {model}: {start.reason}; {start.change}")
     generated: dict[str, str | bytes] = {}
     if out is not None:
         generated = {

@@ -14,6 +14,7 @@ from hypothesis import settings
 
 from bms.native_build import FIRMWARE
 from bms.studies.rivals.native_build import RIVALS
+from hil_sim.native.native_build import NATIVE
 from hil_sim.studies.campaign.native_build import RUNNER
 from tools.long_checks import load_checks
 
@@ -41,7 +42,9 @@ def pytest_configure(config: pytest.Config) -> None:
     folder = config.getoption("--firmware-build")
     if folder is not None:
         FIRMWARE.load_build(folder)
-    for extension in (RIVALS, RUNNER) if folder is not None else (FIRMWARE, RIVALS, RUNNER):
+    for extension in (
+        (RIVALS, NATIVE, RUNNER) if folder is not None else (FIRMWARE, RIVALS, NATIVE, RUNNER)
+    ):
         if extension.is_stale(import_module(extension.module)):
             raise pytest.UsageError(
                 f"{extension.module} was built from other C sources than lie here now; "

@@ -60,6 +60,7 @@ COMMANDS: dict[str, tuple[int, str]] = {
     "compare-estimators": (0, "--preset lin2014 --quick --profiles 1 --out DIR/out"),
     "identify": (1, "--data DIR/run.csv"),
     "import-pykan": (0, "DIR/net --out DIR/model.json"),
+    "cell": (2, "--preset DIR/form.toml --out DIR/out"),
     "preset new": (0, "my_cell --out DIR/cell.toml"),
     "preset check": (1, "DIR/form.toml"),
     "preset show": (0, "a123_26650"),

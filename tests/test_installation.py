@@ -48,8 +48,9 @@ PLACES = f"""
 import importlib, json
 from bms.native_build import FIRMWARE
 from bms.studies.rivals.native_build import RIVALS
+from hil_sim.native.native_build import NATIVE
 from hil_sim.studies.campaign.native_build import RUNNER
-extensions = [(e, importlib.import_module(e.module)) for e in (FIRMWARE, RIVALS, RUNNER)]
+extensions = [(e, importlib.import_module(e.module)) for e in (FIRMWARE, RIVALS, NATIVE, RUNNER)]
 wings = [importlib.import_module(name) for name in {WINGS}]
 print(json.dumps({{
     "places": [list(wing.__path__)[0] for wing in wings] + [m.__file__ for _, m in extensions],

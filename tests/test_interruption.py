@@ -40,12 +40,16 @@ COMMANDS = {
     "identify": ("identify", "--data", "RECORDING", "--out", "cell.toml"),
     "explain": ("explain", "--model", "MODEL", "--out", "out"),
     "bound": ("bound", "--model", "MODEL", "--out", "out"),
+    "cell": ("cell", "--preset", "lin2014", "--out", "out"),
     "plating": ("plating", "--out", "map.toml"),
     "replay": ("replay", "--against", "ROOT", "ROOT", "ROOT/tests/hil_sim/golden"),
     "compare-targets": ("compare-targets", "--target", "qemu:mps2-an386", "--build", "IMAGES"),
 }
-KEPT = {"campaign.json", "chunks"}
-"""What `bms campaign --resume` goes on with."""
+KEPT = {
+    "campaign": {"campaign.json", "chunks"},
+    "cell": {"cell.json", "preset.toml", "report.html"},
+}
+"""What `bms campaign --resume` and another call of `bms cell` go on with."""
 
 
 def processes_of_group(group: int) -> list[str]:
@@ -106,7 +110,7 @@ def test_ctrl_c_ends_a_command_at_once(name, is_for_all, tmp_path, tmp_path_fact
     assert took_s < END_S + START_S
     assert left == []
     files = {path.name for path in Path(tmp_path).rglob("*") if path.parent.name != "chunks"}
-    assert files - {"out"} <= (KEPT if name.startswith("campaign") else set())
+    assert files - {"out"} <= KEPT.get(name.split()[0], set())
 
 
 BUSY = """

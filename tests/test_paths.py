@@ -41,6 +41,8 @@ COMMANDS = {
     "identify, data": ("identify", "--data", "LOCKED"),
     "identify, preset": ("identify", "--data", "run.csv", "--preset", "LOCKED.toml"),
     "import-pykan": ("import-pykan", "LOCKED", "--out", "model.json"),
+    "cell, preset": ("cell", "--preset", "LOCKED.toml", "--out", "out"),
+    "cell, out": ("cell", "--preset", "lin2014", "--out", "LOCKED"),
     "preset new": ("preset", "new", "mine", "--out", "LOCKED.toml"),
     "preset check": ("preset", "check", "LOCKED.toml"),
     "preset diff": ("preset", "diff", "lin2014", "LOCKED.toml"),

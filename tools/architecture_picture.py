@@ -27,7 +27,7 @@ CORE = (
     ("port/   carries frames, tells the time", "boot/   image/   what stands in flash"),
     (
         "bms   the ECU application",
-        "network   monitor   planner   calibration",
+        "network   pace   monitor   planner   calibration",
         "kan   history   thermal   rcbf   soc   request",
         "e2e   codec",
     ),

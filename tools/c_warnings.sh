@@ -2,13 +2,13 @@
 # Warnings as errors over every C source: the host's by CC, those of microcontroller ports by their own compiler.
 set -eu
 flags="-std=c99 -pedantic -Wall -Wextra -Werror -Wconversion -Wdouble-promotion -Wmissing-prototypes -fsyntax-only"
-runner=hil_sim/studies/campaign/native rivals=bms/studies/rivals/native programs=tests/firmware/native
+native=hil_sim/native runner=hil_sim/studies/campaign/native rivals=bms/studies/rivals/native programs=tests/firmware/native
 includes=""
 for part in include src generated image boot port host; do includes="$includes -Ifirmware_c/$part"; done
 
 for source in firmware_c/src/*.c firmware_c/generated/*.c firmware_c/image/*.c firmware_c/boot/*.c firmware_c/port/*.c \
-  firmware_c/host/*.c "$runner"/*.c "$rivals"/*.c "$programs"/*.c; do
-  ${CC:-cc} $flags $includes -I"$runner" -I"$rivals" -I"$programs" "$source"
+  firmware_c/host/*.c "$native"/*.c "$runner"/*.c "$rivals"/*.c "$programs"/*.c; do
+  ${CC:-cc} $flags $includes -I"$native" -I"$runner" -I"$rivals" -I"$programs" "$source"
 done
 for source in firmware_c/port/linux/*.c; do # the operating system's own interface is beyond C99
   ${CC:-cc} $flags -D_DEFAULT_SOURCE $includes "$source"

@@ -2,6 +2,9 @@
 
 from bms.native_build import FIRMWARE
 from bms.studies.rivals.native_build import RIVALS
+from hil_sim.native.native_build import NATIVE
 from hil_sim.studies.campaign.native_build import RUNNER
 
-firmware, rivals, runner = (extension.builder() for extension in (FIRMWARE, RIVALS, RUNNER))
+firmware, rivals, native, runner = (
+    extension.builder() for extension in (FIRMWARE, RIVALS, NATIVE, RUNNER)
+)

@@ -66,6 +66,23 @@ def barrier_constants(cell: CellParameters, preset: Preset) -> BarrierConstants:
     )
 
 
+def surface_rate_in_force_K_per_s2(cell: CellParameters, preset: Preset) -> Any:
+    """Bound on the surface disturbance's slope with which the paper's Delta4 is the one in force.
+
+    The preset's own in the paper's form; otherwise, where no slope is assumed, what the worst case
+    in the chain counts for.
+    """
+    gains, bounds = preset.gains, preset.uncertainty
+    if gains.surface_condition == "paper":
+        return bounds.surface_rate_K_per_s2
+    own_per_s = 1 / (cell.core_resistance_K_per_W * cell.surface_heat_capacity_J_per_K) + 1 / (
+        cell.surface_resistance_K_per_W * cell.surface_heat_capacity_J_per_K
+    )
+    first_per_s, second_per_s = gains.surface_roots_per_s
+    in_chain_per_s = abs(own_per_s - first_per_s) + second_per_s
+    return (in_chain_per_s - abs(own_per_s - gains.alpha4_per_s)) * bounds.surface_K_per_s
+
+
 def _surface_reserve_K_per_s2(cell: CellParameters, preset: Preset) -> Any:
     """Delta4: what disturbances can take from the surface condition.
 

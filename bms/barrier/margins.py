@@ -19,7 +19,7 @@ import numpy as np
 
 from bms.barrier.constants import barrier_constants
 from bms.barrier.rates import Weights, largest_rate
-from bms.barrier.readings import reading_errors, soc_error_bound
+from bms.barrier.readings import reading_errors, soc_error_bound, soc_reserve
 from bms.barrier.rounding import CONSTANT_ROUNDINGS, ROUNDINGS, UNIT, rounding_allowances
 from bms.bus_signals import BUS, BusQuantisation
 from bms.cell import CellParameters
@@ -87,8 +87,11 @@ def sampling_margins(cell: CellParameters, preset: Preset, bus: BusQuantisation 
     held_s = preset.timing.sampling_period_s + preset.timing.delay_s
     core_gain = preset.gains.core_gain_per_s(cell)
     errors, allowances = reading_errors(preset, bus), decision_allowances(cell, preset, bus)
-    soc_change = soc_error_bound(cell, preset, bus) + charge_taken_up(
-        cell, preset, bus, strongest_current_A(preset, bus)
+    reserve = soc_reserve(cell, preset, bus)
+    soc_change = (
+        soc_error_bound(cell, preset, bus)
+        - reserve
+        + charge_taken_up(cell, preset, bus, strongest_current_A(preset, bus))
     )
 
     # How fast each left-hand side can fall at a held current; the terms with a product of core
@@ -108,7 +111,9 @@ def sampling_margins(cell: CellParameters, preset: Preset, bus: BusQuantisation 
         + np.abs(constants.a8_per_As2) * coupling
     )
     return Margins(
-        voltage_V=_plain(_voltage_rise_V(cell, preset, bus, soc_change) + allowances.voltage_V),
+        voltage_V=_plain(
+            _voltage_rise_V(cell, preset, bus, reserve, soc_change) + allowances.voltage_V
+        ),
         soc_per_s=_plain(preset.gains.alpha1_per_s * soc_change + allowances.soc_per_s),
         core_K_per_s=_plain(
             held_s * core_fall + constants.a1_per_s * errors.surface_K + allowances.core_K_per_s
@@ -124,13 +129,13 @@ def sampling_margins(cell: CellParameters, preset: Preset, bus: BusQuantisation 
 
 
 def _voltage_rise_V(
-    cell: CellParameters, preset: Preset, bus: BusQuantisation, soc_change: Any
+    cell: CellParameters, preset: Preset, bus: BusQuantisation, reserve: Any, soc_change: Any
 ) -> Any:
     """Largest rise of the open-circuit voltage by a charge, where the voltage limits the current.
 
     It does from where the strongest current would exceed the limit at the end of the hold, up to
-    where the cell rests at the limit or is complete. The table as the firmware has it, in float32,
-    lies a little aside.
+    where the cell rests at the limit or is complete, with the reserve beyond what is counted. The
+    table as the firmware has it, in float32, lies a little aside, and ends where it is full.
     """
     limits = preset.limits
     soc_change = soc_change + CONSTANT_ROUNDINGS * UNIT
@@ -138,8 +143,12 @@ def _voltage_rise_V(
     first_soc = np.where(
         free_V >= cell.ocv.voltage_V[-1], np.inf, cell.ocv.soc_at(free_V) - soc_change
     )
-    last_soc = np.minimum(cell.ocv.soc_at(limits.max_voltage_V), limits.completion_soc)
-    return cell.ocv.largest_rise_V(soc_change, np.maximum(first_soc, 0.0), last_soc)
+    last_soc = np.minimum(cell.ocv.soc_at(limits.max_voltage_V), limits.completion_soc + reserve)
+    within_V = cell.ocv.largest_rise_V(soc_change, np.maximum(first_soc, 0.0), last_soc)
+    end_soc = cell.ocv.soc[-1]
+    beyond = np.maximum(limits.completion_soc + reserve - end_soc, 0.0)
+    beyond_V = cell.ocv(end_soc + beyond + soc_change) - cell.ocv(end_soc)
+    return np.where(beyond > 0.0, np.maximum(within_V, beyond_V), within_V)
 
 
 def _plain(value: Any) -> Any:

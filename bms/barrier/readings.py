@@ -34,6 +34,14 @@ def reading_errors(preset: Preset, bus: BusQuantisation = BUS) -> ReadingErrors:
     )
 
 
+def soc_reserve(cell: CellParameters, preset: Preset, bus: BusQuantisation = BUS) -> float:
+    """What is added to the counted state of charge before it decides: the fullest possible cell.
+
+    None for a family, which follows the interval of its charge itself.
+    """
+    return 0.0 if preset.cell.interval is not None else soc_error_bound(cell, preset, bus)
+
+
 def soc_error_bound(cell: CellParameters, preset: Preset, bus: BusQuantisation = BUS) -> float:
     """Bound on the counted state of charge: steady errors add up, noise grows as the root.
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from bms.barrier import barrier_constants, sampling_margins
+from bms.barrier.readings import soc_reserve
 from bms.barrier.surface_prediction import surface_prediction
 from bms.calibration.family_block import family_fields
 from bms.calibration.planner_block import planner_fields
@@ -23,7 +24,7 @@ from bms.model.pair import check_pair
 from bms.presets import Preset
 from bms.tables.network_tables import network_tables
 
-LAYOUT = 4
+LAYOUT = 5
 """Layout number of bms_calibration_t that this module fills (BMS_CALIBRATION_LAYOUT)."""
 MAX_OCV_POINTS = 64
 
@@ -52,6 +53,7 @@ def calibration_fields(
         "reference_current_A": preset.limits.reference_current_A,
         "current_growth_A": preset.limits.current_growth_A_per_s * preset.timing.sampling_period_s,
         "completion_soc": preset.limits.completion_soc,
+        "soc_error": soc_reserve(preset.cell, preset),
         "rcbf": _barrier_fields(preset, model.error_bound_K),
         "plausibility": plausibility_fields(preset),
         "thermal": _thermal_fields(preset),

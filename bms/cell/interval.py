@@ -7,7 +7,7 @@ from typing import Annotated
 
 from annotated_types import Gt, Le
 
-from bms.errors import InputError
+from bms.errors import refuse
 from bms.validation import NonNegative, Positive, strict
 
 Factors = tuple[Positive, Positive]
@@ -38,9 +38,8 @@ class CellInterval:
     longest_relaxation_s: Annotated[float, Gt(0.0), Le(3600.0)]
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, tuple) and not value[0] <= 1.0 <= value[1]:
-                raise InputError(
-                    f"cell.interval.{field.name}: must rise and hold 1, the nominal cell"
-                )
+        refuse(
+            f"cell.interval.{name}: must rise and hold 1, the nominal cell"
+            for name, value in ((field.name, getattr(self, field.name)) for field in fields(self))
+            if isinstance(value, tuple) and not value[0] <= 1.0 <= value[1]
+        )

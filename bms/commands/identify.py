@@ -12,7 +12,8 @@ import typer
 from rich.console import Console
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
-from bms.commands import options
+from bms.commands import options, surface_options
+from bms.commands.identify_surface import has_measured_core, identify_surface
 from bms.data.datasets import training_rows
 from bms.data.measurements import Measurements, read_measurements, read_voltage
 from bms.errors import InputError
@@ -37,10 +38,22 @@ _DIGITS = 6
 
 
 def identify(
-    data: options.DataOption,
+    data: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--data",
+            help="Recording with a measured core (columns as of bms train), or recordings of a "
+            "cycler, CSV or TXT. May be repeated; further files may follow it.",
+        ),
+    ] = None,
+    more: Annotated[
+        list[Path] | None, typer.Argument(metavar="[FILE]...", help="Further recordings.")
+    ] = None,
     preset: Annotated[
         str,
-        options.preset_option("Preset to start from, and for what the data do not identify"),
+        options.preset_option(
+            "Preset to start from, and for what the data do not identify, with a measured core"
+        ),
     ] = "lin2014",
     out: Annotated[
         Path | None, typer.Option("--out", help="Preset with the fitted cell to write (.toml).")
@@ -54,11 +67,22 @@ def identify(
             help="RMS in K within which the model follows the temperatures with its disturbance.",
         ),
     ] = ACCURACY_K,
+    columns: surface_options.ColumnsOption = None,
+    temperature_unit: surface_options.TemperatureUnitOption = "K",
+    charge_is_positive: surface_options.ChargeSignOption = False,
+    sample_period_s: surface_options.SamplePeriodOption = None,
+    geometry: surface_options.GeometryOption = None,
+    rated: surface_options.RatedOption = None,
+    entropy: surface_options.EntropyOption = None,
+    check: surface_options.CheckOption = None,
+    save_as: surface_options.SaveAsOption = None,
+    report: surface_options.ReportOption = None,
     as_json: options.JsonOption = False,
 ) -> int:
-    """Fit a cell's thermal parameters to measured core and surface temperature (K).
+    """Fit a cell to recordings: its thermal part with a measured core, all of it without one.
 
-    The first two thirds of the recording are fitted, the last third is simulated on and compared.
+    With a measured core (column core_temperature_K), the thermal parameters. The first two thirds
+    of the recording are fitted, the last third is simulated on and compared.
     Temperatures fix ratios only: the core's heat capacity (J/K) is the preset's and sets the scale.
     A parameter that the data do not tell, or only at the bound of the search, is named with the
     reason; then no preset is written and the exit code is 1.
@@ -68,10 +92,35 @@ def identify(
     each of 19 stretches; the preset states it. With a column voltage_V (V) the core's is found with
     the measured heat too, which is what a preset with cell.interval states.
 
+    Without one, from one or more recordings of a cycler, a whole preset of a family: open-circuit
+    voltage and capacity, resistances, heat capacity, cooling, dU/dT, with intervals; limits are
+    those of --rated, else what the recordings have shown. Every number's source stands beside it.
+
     Example: bms identify --data cycle.csv --preset lin2014 --out my_cell.toml
     """
-    if data is None:
-        raise InputError("identify: give --data CSV")
+    files = [*(data or []), *(more or [])]
+    if not files:
+        raise InputError("identify: give --data FILE")
+    chosen = surface_options.SurfaceOptions(
+        tuple(columns or ()),
+        temperature_unit,
+        charge_is_positive,
+        sample_period_s,
+        geometry,
+        tuple(rated or ()),
+        entropy,
+        check,
+        save_as,
+        report,
+    )
+    if chosen.is_given or len(files) > 1 or not has_measured_core(files[0]):
+        return identify_surface(files, chosen, out, as_json=as_json)
+    return _identify_measured(files[0], preset, out, accuracy_K, as_json=as_json)
+
+
+def _identify_measured(
+    data: Path, preset: str, out: Path | None, accuracy_K: float, *, as_json: bool
+) -> int:
     if out is not None and out.suffix != ".toml":
         raise InputError(f"--out {out}: a preset is a file with the ending .toml; change the name")
     start = load_preset(preset)

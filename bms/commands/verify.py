@@ -16,9 +16,11 @@ from bms.errors import InputError
 from bms.model.model_file import KanModel
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET, Preset
+from bms.presets.paper_form import in_paper_form
 from bms.text_table import TextTable
 from bms.verification import (
     CLASHING_DELTA4,
+    ESTIMATE,
     LARGEST_BOXES,
     PARTS,
     SLIPS,
@@ -65,6 +67,8 @@ def verify(
                 "--slips and --formulas, or take a preset without cell.interval"
             )
         return _verify_family(*pair, as_json)
+    if slips or formulas is not Formulas.CORRECTED:
+        pair = (_of_the_paper(pair[0]), pair[1])
     costs = []
     shown = ((), *((slip,) for slip in (*SLIPS, CLASHING_DELTA4)), SLIPS) if slips else ()
     with waiting("verifying", (1 + len(shown)) * PARTS + len(shown), "parts") as wait:
@@ -83,6 +87,11 @@ def verify(
         if costs:
             _print_costs(costs)
     return EXIT_DONE if result.certified else EXIT_CHECK_FAILED
+
+
+def _of_the_paper(preset: Preset) -> Preset:
+    """The preset with a surface condition that the paper's slips can be in."""
+    return preset if preset.gains.surface_condition == "paper" else in_paper_form(preset)
 
 
 def _verify_family(preset: Preset, model: KanModel, as_json: bool) -> int:
@@ -136,6 +145,8 @@ def _print(result: Verification) -> None:
             console.print(
                 f"{barrier.name}: NOT certified: {_finding(result.refusals[barrier.name])}"
             )
+    if ESTIMATE in result.refusals:
+        console.print(f"{ESTIMATE}: NOT usable: {_finding(result.refusals[ESTIMATE])}")
     margins = ", ".join(f"{name} {value:.4g}" for name, value in result.margins.items())
     console.print(f"margins: {margins}; error bound {result.error_bound_K:.4f} K")
     part = result.fallback

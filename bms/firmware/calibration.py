@@ -12,21 +12,37 @@ from bms.model.model_file import KanModel
 from bms.native_build import ROOT
 from bms.presets import DEFAULT_PRESET, Preset, load_preset
 
+_HASHES_END = ffi.offsetof("bms_calibration_t", "sampling_period_s")
+
 
 def calibration_bytes(preset: Preset, model: KanModel) -> bytes:
     """The calibration block as it stands in flash; raises what calibration_block raises."""
-    return bytes(ffi.buffer(calibration_block(preset, model, compiled_in=False)))
+    return used_bytes(bytes(ffi.buffer(calibration_block(preset, model, compiled_in=False))))
+
+
+def used_bytes(block: bytes) -> bytes:
+    """A whole block up to the end of its model's tables, behind which the firmware reads nothing.
+
+    Raises ValueError for fewer bytes than a block has, or a model whose sizes exceed the maxima.
+    """
+    size = ffi.sizeof("bms_calibration_t")
+    if len(block) < size:
+        raise ValueError(f"a calibration block has {size} bytes, not {len(block)}")
+    kan = ffi.addressof(ffi.from_buffer("bms_calibration_t *", block), "kan")
+    length = lib.kan_model_length(kan)
+    if not length:
+        raise ValueError("a calibration block whose model exceeds the maxima has no length")
+    return block[: ffi.offsetof("bms_calibration_t", "kan") + length]
 
 
 def calibration_hashes(content: bytes) -> tuple[int, int]:
     """First 32 bits of the hashes of model and preset in a block as it stands in flash.
 
-    Raises ValueError for fewer bytes than a block has.
+    Raises ValueError for fewer bytes than they need.
     """
-    size = ffi.sizeof("bms_calibration_t")
-    if len(content) < size:
-        raise ValueError(f"a calibration block has {size} bytes, not {len(content)}")
-    block = ffi.from_buffer("bms_calibration_t *", content)
+    if len(content) < _HASHES_END:
+        raise ValueError(f"the hashes take {_HASHES_END} bytes of a block, not {len(content)}")
+    block = ffi.cast("bms_calibration_t *", ffi.from_buffer(content))
     return block.model_hash, block.preset_hash
 
 

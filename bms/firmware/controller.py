@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from bms.arrays import Array, Mask
 from bms.barrier import sampling_margins
+from bms.barrier.constants import surface_rate_in_force_K_per_s2
 from bms.data.simulate import Samples
 from bms.decision import ACTIVE_CONSTRAINTS, ConstraintMargins, Decision
 from bms.errors import InputError
@@ -195,7 +196,7 @@ class Firmware:
                 "core_uncertainty_K_per_s": bounds.core_K_per_s,
                 "surface_uncertainty_K_per_s": bounds.surface_K_per_s,
                 "coolant_uncertainty_K_per_s": bounds.coolant_K_per_s,
-                "surface_uncertainty_rate_K_per_s2": bounds.surface_rate_K_per_s2,
+                "surface_uncertainty_rate_K_per_s2": surface_rate_in_force_K_per_s2(cell, preset),
                 "estimation_error_bound_K": self.model.error_bound_K,
                 "sampling_period_s": preset.timing.sampling_period_s,
                 "voltage_margin_V": margins.voltage_V,

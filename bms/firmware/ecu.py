@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import struct
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from bms.calibration import NO_CHANGES
@@ -13,6 +14,9 @@ from bms.model.pair import load_pair
 from bms.presets import Preset
 
 _FRAME_BYTES = len(ffi.new("can_frame_t *").data)
+_FRAME = struct.Struct(f"=IB{_FRAME_BYTES}s3x")
+assert _FRAME.size == ffi.sizeof("can_frame_t")
+_MOST_ANSWERS = 16
 
 
 class Ecu:
@@ -37,6 +41,8 @@ class Ecu:
         )
         self._state = ffi.new("bms_t *")
         self._frame = ffi.new("can_frame_t *")
+        self._sent = ffi.new("can_frame_t[]", _MOST_ANSWERS)
+        self._sent_bytes = ffi.buffer(self._sent)
         config = ffi.new("bms_config_t *", {"calibration": self._calibration})
         lib.bms_init(self._state, config)
 
@@ -58,3 +64,19 @@ class Ecu:
         while lib.bms_transmit(self._state, frame):
             frames.append((frame.id, bytes(ffi.buffer(frame.data, frame.length))))
         return frames
+
+    def exchange(self, frames: Sequence[tuple[int, bytes]]) -> list[tuple[int, bytes]]:
+        """A control period by one call of C: receive these frames, step, transmit."""
+        content = b"".join(
+            [_FRAME.pack(i, min(len(data), _FRAME_BYTES + 1), data) for i, data in frames]
+        )
+        count = lib.host_exchange(
+            self._state,
+            ffi.from_buffer("can_frame_t[]", content),
+            len(frames),
+            self._sent,
+            _MOST_ANSWERS,
+        )
+        sent = bytes(self._sent_bytes[: count * _FRAME.size])
+        answers = [(i, data[:length]) for i, length, data in _FRAME.iter_unpack(sent)]
+        return answers if count < _MOST_ANSWERS else answers + self.transmit()

@@ -64,17 +64,17 @@ def missing_rates(
     coolant = None
     if np.any(recording.cooling_power_W != 0.0):
         cooled_W = outer_W - recording.cooling_power_W[:-1]
-        coolant = _missing(
+        coolant = missing_rate(
             recording.time_s, coolant_K, cooled_W / cell.coolant_heat_capacity_J_per_K, accuracy_K
         )
     return MissingRates(
-        _missing(
+        missing_rate(
             recording.time_s,
             core_K,
             (heat_W - inner_W) / cell.core_heat_capacity_J_per_K,
             accuracy_K,
         ),
-        _missing(
+        missing_rate(
             recording.time_s,
             surface_K,
             (inner_W - outer_W) / cell.surface_heat_capacity_J_per_K,
@@ -84,7 +84,7 @@ def missing_rates(
     )
 
 
-def _missing(
+def missing_rate(
     time_s: Array, measured_K: Array, known_K_per_s: Array, accuracy_K: float
 ) -> MissingRate:
     """The smoothest rate that leads from the known one (N - 1,) to the measured temperature (N,).

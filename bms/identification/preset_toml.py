@@ -10,23 +10,38 @@ from typing import Any
 from bms.presets import Preset
 
 
-def preset_toml(preset: Preset) -> str:
-    """TOML text that load_preset reads as the same preset; absent optional values are left out."""
+def preset_toml(preset: Preset, notes: Mapping[str, str] | None = None) -> str:
+    """TOML text that load_preset reads as the same preset; absent optional values are left out.
+
+    `notes` by key, such as cell.capacity_Ah, stand as comments behind their numbers, those of a
+    table behind its heading.
+    """
     lines = []
     content = dataclasses.asdict(preset)
     lines += [f"{key} = {_value(value)}" for key, value in content.items() if _is_plain(value)]
-    lines += _sections(content, ())
+    lines += _sections(content, (), notes or {})
     return "\n".join(lines) + "\n"
 
 
-def _sections(content: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
+def _noted(line: str, path: tuple[str, ...], notes: Mapping[str, str]) -> str:
+    note = notes.get(".".join(path))
+    return line if note is None else f"{line}  # {note}"
+
+
+def _sections(
+    content: Mapping[str, Any], path: tuple[str, ...], notes: Mapping[str, str]
+) -> list[str]:
     lines = []
     for name, section in content.items():
         if isinstance(section, dict):
             here = (*path, name)
-            lines += ["", f"[{'.'.join(here)}]"]
-            lines += [f"{key} = {_value(v)}" for key, v in section.items() if _is_plain(v)]
-            lines += _sections(section, here)
+            lines += ["", _noted(f"[{'.'.join(here)}]", here, notes)]
+            lines += [
+                _noted(f"{key} = {_value(v)}", (*here, key), notes)
+                for key, v in section.items()
+                if _is_plain(v)
+            ]
+            lines += _sections(section, here, notes)
     return lines
 
 

@@ -10,6 +10,7 @@ from bms.firmware.image_header import (
     FIRMWARE_VERSION,
     HEADER_LAYOUT,
     HEADER_LENGTH,
+    LONGEST_CALIBRATION,
     Header,
 )
 from bms.image.memory_map import ERASED, MEMORY_MAP
@@ -25,16 +26,15 @@ def calibration_part(preset: Preset, model: KanModel) -> bytes:
     """
     content = calibration_bytes(preset, model)
     model_hash, preset_hash = calibration_hashes(content)
-    length = HEADER_LENGTH + len(content)
     header = Header(
         magic=CALIBRATION_MAGIC,
         crc32=0,
-        length=length,
+        length=HEADER_LENGTH + len(content),
         header_layout=HEADER_LAYOUT,
         target=ANY_TARGET,
         firmware_version=FIRMWARE_VERSION,
         calibration_layout=CALIBRATION_LAYOUT,
-        calibration_length=length,
+        calibration_length=LONGEST_CALIBRATION,
         model_hash=model_hash,
         preset_hash=preset_hash,
     )

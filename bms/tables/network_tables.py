@@ -61,8 +61,9 @@ class NetworkTables:
             "input_scale": [1.0 / half for half in network.input_half_range],
             "output_center_K": network.output_center_K,
             "output_half_range_K": network.output_half_range_K,
-            "knots": np.concatenate([edge.knots for edge in self.edges]).tolist(),
-            "coefficients": np.concatenate([e.coefficients.ravel() for e in self.edges]).tolist(),
+            "tables": np.concatenate(
+                [part for e in self.edges for part in (e.knots, e.coefficients.ravel())]
+            ).tolist(),
         }
 
     def _spans(self, reach: float) -> bool:

@@ -125,6 +125,7 @@ def firmware_constants(preset: Preset, model: KanModel) -> dict[str, Any]:
             tuple(block.ocv_soc[0 : block.ocv_points]), tuple(block.ocv_V[0 : block.ocv_points])
         ),
         "completion_soc": calibration.completion_soc,
+        "soc_error": calibration.soc_error,
         "core_error_term": ErrorTerm.ABSOLUTE,
         "surface_error_term": ErrorTerm.ABSOLUTE,
     }

@@ -23,7 +23,8 @@ def decide(
     The interval is empty, lower above upper, where no current is safe.
     """
     k = constants
-    soc, core_K, surface_K, coolant_K = reading
+    counted, core_K, surface_K, coolant_K = reading
+    soc = counted + k["soc_error"]
     voltage_A = (
         -(k["max_voltage_V"] - k["ocv"](soc) - k["voltage_margin_V"]) / k["ohmic_resistance_ohm"]
     )

@@ -127,6 +127,15 @@ class Domain:
             + self.preset.uncertainty.surface_K_per_s
         )
 
+    @property
+    def chain_reserve_K_per_s(self) -> float:
+        """By how much a chain that has the worst disturbance in it is less than chain_value.
+
+        0 for the paper's, which contains the disturbance that acts.
+        """
+        is_worst_case = self.preset.gains.surface_condition == "worst-case"
+        return 2.0 * self.preset.uncertainty.surface_K_per_s if is_worst_case else 0.0
+
 
 def certified_domain(preset: Preset, condition: Condition, surface_chain: Chain) -> Domain:
     """Domain of a preset for the condition that has to hold in it.

@@ -27,10 +27,11 @@ ROUNDING_V = 1e-9
 def certify_voltage(preset: Preset, constants: Mapping[str, Any]) -> tuple[Certificate, float]:
     """Certificate, and the least distance to the limit in V (infinite where nothing charges).
 
-    For counted charge a, the current is what the constraint allows at a; at the end of the hold
-    the true charge is at most a, its error, and what came in meanwhile. The voltage is linear in a
-    between the points where any part of this has a kink, so it is highest at one of them. Where
-    no current is allowed the cell rests, at a charge to which a decision below has brought it.
+    For counted charge a, the current is what the constraint allows at a and the firmware's reserve;
+    at the end of the hold the true charge is at most a, its error, and what came in meanwhile. The
+    voltage is linear in a between the points where any part of this has a kink, so it is highest at
+    one of them. Where no current is allowed the cell rests, at a charge to which a decision below
+    has brought it.
     """
     cell, ocv, limits = preset.cell, constants["ocv"], preset.limits
     resistance_ohm = constants["ohmic_resistance_ohm"]
@@ -44,17 +45,22 @@ def certify_voltage(preset: Preset, constants: Mapping[str, Any]) -> tuple[Certi
         return Certificate("voltage", 1, 1, shortfall=Shortfall({}, full_V)), full_V
     if full_V <= ocv.voltage_V[0]:
         return Certificate("voltage", 1, 0), np.inf
-    error = soc_error_bound(cell, preset)
+    error, reserve = soc_error_bound(cell, preset), constants["soc_error"]
 
     def current_A(counted: Array) -> Array:
-        return np.asarray(np.clip((full_V - ocv(counted)) / resistance_ohm, 0.0, strongest_A))
+        free_V = full_V - ocv(counted + reserve)
+        return np.asarray(np.clip(free_V / resistance_ohm, 0.0, strongest_A))
 
     def end_soc(counted: Array) -> Array:
         taken_up = charge_taken_up(cell, preset, BUS, current_A(counted))
         return np.asarray(counted + error + taken_up)
 
-    last = min(float(ocv.soc_at(full_V)), constants["completion_soc"])
-    kinks = [*ocv.soc, float(ocv.soc_at(full_V - resistance_ohm * strongest_A)), last]
+    rests_at = float(ocv.soc_at(full_V)) - reserve
+    if full_V >= ocv.voltage_V[-1]:
+        rests_at = np.inf
+    last = min(rests_at, constants["completion_soc"])
+    limits_at = (*ocv.soc, float(ocv.soc_at(full_V - resistance_ohm * strongest_A)))
+    kinks = [*(kink - reserve for kink in limits_at), 0.0, last]
     counted = np.unique([kink for kink in kinks if 0.0 <= kink <= last])
     counted = np.concatenate([counted, _crossings(counted, end_soc(counted), cell.ocv.soc)])
     current, end = current_A(counted), end_soc(counted)
@@ -93,7 +99,7 @@ def certify_soc(preset: Preset, constants: Mapping[str, Any]) -> Certificate:
         + min(0.0, strongest_A * (1.0 / k["capacity_As"] - 1.0 / cell.capacity_As))
         + min(gain * limits.max_soc, gain * (limits.max_soc - limits.completion_soc))
         - k["alpha1_per_s"] * (k["max_soc"] - limits.max_soc)
-        - alpha1 * moved
+        - alpha1 * (moved - k["soc_error"])
         - decision_allowances(cell, preset, BUS, ARITHMETIC_ROUNDINGS).soc_per_s
     )
     # Up to completion the charge may also simply be too far from its limit to get there.

@@ -88,10 +88,11 @@ def _voltage_before_completion(preset: Preset, constants: Mapping[str, Any]) -> 
     limits, ocv = preset.limits, constants["ocv"]
     # Open-circuit voltages from which no current is allowed, and at completion.
     rest_V = constants["max_voltage_V"] - constants["voltage_margin_V"]
-    end_V = float(ocv(constants["completion_soc"]))
+    reserve = constants["soc_error"]
+    end_V = float(ocv(constants["completion_soc"] + reserve))
     if end_V < rest_V:
         return None
-    last_soc = float(ocv.soc_at(rest_V))
+    last_soc = float(ocv.soc_at(rest_V)) - reserve
     needed_V = limits.max_voltage_V
     # The margin follows the limit, because it looks at the part of the table that limits.
     while needed_V - end_V <= _margin_V(preset, needed_V):
@@ -115,7 +116,7 @@ def _margin_V(preset: Preset, max_voltage_V: float) -> float:
 def _soc_before_completion(preset: Preset, constants: Mapping[str, Any]) -> Finding | None:
     k, limits = constants, preset.limits
     reserved = (k["soc_uncertainty_per_s"] + k["soc_margin_per_s"]) / k["alpha1_per_s"]
-    last_soc = k["max_soc"] - reserved
+    last_soc = k["max_soc"] - k["soc_error"] - reserved
     if k["completion_soc"] < last_soc:
         return None
     change = "reduce the errors of sensors.current_A and timing.delay_s"

@@ -106,22 +106,26 @@ def simulate_hold(
 ) -> Any:
     """Smallest value of a barrier while a current is held from a state, at heating disturbances.
 
-    The surface disturbance starts at its lower bound for the chain, of which it is a part, and
-    rises as fast as its slope bound lets it. Any array shape.
+    The surface disturbance starts at its lower bound for a chain of which it is a part, and rises
+    as fast as its slope bound lets it. A chain that has its worst case in it falls fastest at one
+    of the bounds. Any array shape.
     """
     preset, bounds = domain.preset, domain.preset.uncertainty
     step_s = domain.held_s / SUB_STEPS
-    # The first steps resolve the rise of the surface disturbance.
-    rise_s = 2.0 * bounds.surface_K_per_s / max(bounds.surface_rate_K_per_s2, 1e-12)
-    steps_s = [rise_s] if barrier is Barrier.SURFACE and rise_s < step_s else []
-    steps_s += [step_s] * SUB_STEPS
-    surface = -bounds.surface_K_per_s if barrier is Barrier.SURFACE else bounds.surface_K_per_s
+    steps_s, surface = [step_s] * SUB_STEPS, bounds.surface_K_per_s
+    highest = bounds.surface_K_per_s
+    if barrier is Barrier.SURFACE and domain.chain_reserve_K_per_s > 0.0:
+        # Warmth of the surface flows off: it lowers its rate, which is in the chain as well.
+        outflow_per_s = domain.surface_rate(-1.0, 1.0)
+        surface = highest = float(np.sign(domain.chain.first_per_s + outflow_per_s)) * highest
+    elif barrier is Barrier.SURFACE:
+        # The first steps resolve the rise of the surface disturbance.
+        rise_s = 2.0 * bounds.surface_K_per_s / max(bounds.surface_rate_K_per_s2, 1e-12)
+        steps_s = [rise_s] * (rise_s < step_s) + steps_s
+        surface = -surface
     lowest = _barrier(domain, state, current_A, surface, barrier)
     for length_s in steps_s:
-        after = min(
-            surface + bounds.surface_rate_K_per_s2 * length_s * (1.0 + 1e-12),
-            bounds.surface_K_per_s,
-        )
+        after = min(surface + bounds.surface_rate_K_per_s2 * length_s * (1.0 + 1e-12), highest)
         state = integrate_step(
             preset.cell, state, current_A, cooling_W, length_s,
             _upward(domain, surface), _upward(domain, after),
@@ -146,6 +150,8 @@ def _barrier(
     if barrier is Barrier.VOLTAGE:
         return limits.max_voltage_V - terminal_voltage_V(domain.preset.cell, soc, current_A)
     best = domain.chain_value(surface_K, core_K - surface_K, surface_K - coolant_K)
+    if domain.chain_reserve_K_per_s > 0.0:
+        return best - domain.chain_reserve_K_per_s
     return best - domain.preset.uncertainty.surface_K_per_s - surface_disturbance
 
 
@@ -167,7 +173,7 @@ def _edge_states(
         core_gap = limits.max_core_temperature_K - surface_K
     elif barrier is Barrier.SURFACE:
         # psi = 0 solved for the coolant temperature; psi falls with the surface's rate.
-        rest = domain.chain_value(surface_K, core_gap, 0.0)
+        rest = domain.chain_value(surface_K, core_gap, 0.0) - domain.chain_reserve_K_per_s
         coolant_gap = rest / domain.surface_rate(0.0, 1.0)
     else:
         surface_K = rng.uniform(low.surface_K, high.surface_K - 15.0, samples)
@@ -178,7 +184,9 @@ def _edge_states(
     inside &= (coolant_K <= box.coolant_temperature_K[1]) & (surface_K >= low.surface_K)
     # The chain must hold at the surface disturbance that the simulation starts with.
     inside &= domain.chain_value(surface_K, core_gap, coolant_gap) >= (
-        -1e-12 if barrier is Barrier.SURFACE else 2.0 * domain.preset.uncertainty.surface_K_per_s
+        domain.chain_reserve_K_per_s - 1e-12
+        if barrier is Barrier.SURFACE
+        else 2.0 * domain.preset.uncertainty.surface_K_per_s
     )
     for flow in domain.flows:
         inside &= flow.rate(core_gap, coolant_gap) <= flow.largest

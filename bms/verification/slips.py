@@ -63,6 +63,7 @@ def _no_margins(_: Preset, constants: dict[str, Any]) -> dict[str, Any]:
     return {name: 0.0 for name in constants if name.endswith(("margin_V", "_margin_per_s"))} | {
         "core_margin_K_per_s": 0.0,
         "surface_margin_K_per_s2": 0.0,
+        "soc_error": 0.0,
     }
 
 

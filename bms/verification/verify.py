@@ -14,6 +14,7 @@ from bms.barrier.readings import reading_errors
 from bms.barrier.rounding import ARITHMETIC_ROUNDINGS
 from bms.bus_signals import BUS
 from bms.model.model_file import KanModel
+from bms.model.start import unknown_start
 from bms.presets import Preset
 from bms.verification.barriers import Barrier
 from bms.verification.certificate import Certificate
@@ -34,6 +35,8 @@ from bms.verification.thermal import Case, certify
 LARGEST_BOXES = 400_000
 PARTS = 4
 """Of a verification: what is electrical, the core, and the surface with two chains."""
+ESTIMATE = "estimate"
+"""What is refused beside the barriers: a model that does not know how a charge begins."""
 MARGINS = {
     "voltage": "voltage_margin_V",
     "soc": "soc_margin_per_s",
@@ -62,8 +65,8 @@ class BarrierResult:
 class Verification:
     """What was shown of a preset's decisions; `certified` when every barrier is.
 
-    `refusals` say why not, by the barrier's name; `obstacles` what keeps a charge, safe as it is,
-    from beginning or from being finished.
+    `refusals` say why not, by the barrier's name or ESTIMATE; `obstacles` what keeps a charge, safe
+    as it is, from beginning or from being finished.
     """
 
     preset: str
@@ -80,7 +83,7 @@ class Verification:
 
     @property
     def certified(self) -> bool:
-        """Whether every barrier is kept and no simulated decision contradicts it."""
+        """Whether every barrier is kept, no simulated decision contradicts it, a charge begins."""
         return not self.refusals
 
     def as_dict(self) -> dict[str, Any]:
@@ -154,6 +157,9 @@ def verify(
         )
         if finding is not None:
             refusals[result.name] = finding
+    start = unknown_start(preset, model)
+    if start is not None:
+        refusals[ESTIMATE] = Finding(start.reason, start.inputs, start.change)
     fallback = infeasible_part(surface_domain, decided_conditions(constants))
     return Verification(
         preset=preset.name,

@@ -6,6 +6,7 @@
  * every instruction, so that ticks are instructions.
  */
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "bms.h"
@@ -184,8 +185,9 @@ static bool take_calibration(cost_t *cost, const char *path)
     }
     cost->calibration = &cost->loaded;
     const int32_t file = semihosting_open(path, SEMIHOSTING_READ);
-    return (file >= 0) &&
-           (semihosting_read(file, &cost->loaded, sizeof cost->loaded) == sizeof cost->loaded) &&
+    const uint32_t length =
+        (file >= 0) ? semihosting_read(file, &cost->loaded, sizeof cost->loaded) : 0u;
+    return (length == offsetof(bms_calibration_t, kan) + kan_model_length(&cost->loaded.kan)) &&
            calibration_is_valid(&cost->loaded);
 }
 

@@ -176,6 +176,7 @@ extern "C" {
 #define CAN_DB_DIAGNOSTICS_FIRST_FAULT_DECISION_INVALID_CHOICE (17u)
 #define CAN_DB_DIAGNOSTICS_FIRST_FAULT_CALIBRATION_CHOICE (18u)
 #define CAN_DB_DIAGNOSTICS_FIRST_FAULT_SURFACE_DEFICIT_CHOICE (19u)
+#define CAN_DB_DIAGNOSTICS_FIRST_FAULT_OUT_OF_STEP_CHOICE (20u)
 #define CAN_DB_DIAGNOSTICS_FIRST_FAULT_NONE_CHOICE (255u)
 
 #define CAN_DB_NETWORK_DIAGNOSTICS_REPORTED_MESSAGE_CELL_ELECTRICAL_CHOICE (0u)
@@ -464,7 +465,7 @@ struct can_db_charge_request_t {
 /**
  * Signals in message ChargeMode.
  *
- * How the charge is to be made; a charger that does not care leaves it out. What came last holds as long as the message is valid. Without it, and in mode Fixed, the charge follows the reference current. Fastest and ByTime are planned: no more than the reference, with the constant current that fills the cell soonest, or with the least that fills it in TimeToFull. A mode that is not known, or ByTime without a time, is an invalid request.
+ * How the charge is to be made; a charger that does not care leaves it out. What came last holds as long as the message is valid. In mode Fixed the charge follows the reference current. Fastest, which is what a charger gets that leaves the message out, and ByTime are planned: no more than the reference, with the constant current that fills the cell soonest, or with the least that fills it in TimeToFull. A mode that is not known, or ByTime without a time, is an invalid request.
  *
  * All signal values are as on the CAN bus.
  */
@@ -933,7 +934,7 @@ struct can_db_boot_refusal_t {
 /**
  * Signals in message Plan.
  *
- * Sent only while ChargeMode asks for a planned charge: the current that the ECU plans to ask for where no limit is nearer, and when it expects the cell to be full.
+ * Sent unless ChargeMode asks for a fixed current: the current that the ECU plans to ask for where no limit is nearer, and when it expects the cell to be full.
  *
  * All signal values are as on the CAN bus.
  */

@@ -67,3 +67,17 @@ uint32_t host_run_periods(bms_t *bms, const can_frame_t *received, uint32_t fram
     }
     return frames_sent;
 }
+
+uint32_t host_exchange(bms_t *bms, const can_frame_t *received, uint32_t count, can_frame_t *sent,
+                       uint32_t room)
+{
+    for (uint32_t i = 0u; i < count; i++) {
+        bms_receive(bms, &received[i]);
+    }
+    bms_step(bms);
+    uint32_t answers = 0u;
+    while ((answers < room) && bms_transmit(bms, &sent[answers])) {
+        answers++;
+    }
+    return answers;
+}

@@ -37,6 +37,11 @@ void host_decide_rows(const rcbf_constants_t *constants, const rcbf_input_t *inp
 uint32_t host_run_periods(bms_t *bms, const can_frame_t *received, uint32_t frames_a_period,
                           uint32_t periods, float *command_A);
 
+/* One control period: takes `count` frames, steps, and fills `sent` with up to `room` frames of the
+ * answer; returns how many there are. */
+uint32_t host_exchange(bms_t *bms, const can_frame_t *received, uint32_t count, can_frame_t *sent,
+                       uint32_t room);
+
 #ifdef __cplusplus
 }
 #endif

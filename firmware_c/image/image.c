@@ -60,6 +60,9 @@ static image_status_t check_part(const image_memory_t *place, uint32_t magic, ui
 
 image_status_t image_check_boot(const image_memory_t *place)
 {
+    if (place->length < sizeof(uint32_t)) {
+        return IMAGE_WRONG_LENGTH;
+    }
     const uint32_t covered = place->length - (uint32_t)sizeof(uint32_t);
     const uint32_t *crc32 = (const uint32_t *)(const void *)&place->bytes[covered];
     return (image_crc32(place->bytes, covered) == *crc32) ? IMAGE_OK : IMAGE_WRONG_CRC;
@@ -94,6 +97,12 @@ image_status_t image_check_application(const image_memory_t *place, uint32_t tar
     return (is_stack_right && is_start_right) ? IMAGE_OK : IMAGE_WRONG_VECTORS;
 }
 
+/* Of a calibration nothing is read behind the tables of its model. */
+static uint32_t used_length(const bms_calibration_t *calibration)
+{
+    return (uint32_t)offsetof(bms_calibration_t, kan) + kan_model_length(&calibration->kan);
+}
+
 image_status_t image_check_calibration(const image_memory_t *place,
                                        const image_header_t *application)
 {
@@ -104,7 +113,7 @@ image_status_t image_check_calibration(const image_memory_t *place,
     }
     const image_header_t *header = header_of(place);
     if ((header->calibration_layout != application->calibration_layout) ||
-        (header->length != application->calibration_length)) {
+        (header->calibration_length != application->calibration_length)) {
         return IMAGE_WRONG_CALIBRATION_LAYOUT;
     }
     if (header->firmware_version != application->firmware_version) {
@@ -113,6 +122,7 @@ image_status_t image_check_calibration(const image_memory_t *place,
     const bms_calibration_t *calibration =
         (const bms_calibration_t *)(const void *)&place->bytes[sizeof *header];
     return ((calibration->layout == header->calibration_layout) &&
+            (header->length == sizeof *header + used_length(calibration)) &&
             (calibration->model_hash == header->model_hash) &&
             (calibration->preset_hash == header->preset_hash))
                ? IMAGE_OK

@@ -32,7 +32,7 @@ typedef struct {
     uint32_t target;             /* board that the code is for, or IMAGE_ANY_TARGET */
     uint32_t firmware_version;   /* of the application, or the one that the calibration is for */
     uint32_t calibration_layout; /* BMS_CALIBRATION_LAYOUT that it was compiled or written for */
-    uint32_t calibration_length; /* bytes of a calibration part in that layout, header included */
+    uint32_t calibration_length; /* most bytes of a calibration part in it, header included */
     uint32_t model_hash;         /* as in the calibration; in an application, of the default one */
     uint32_t preset_hash;
 } image_header_t;
@@ -48,7 +48,7 @@ typedef enum {
     IMAGE_WRONG_VECTORS = 6,           /* start address or stack outside of where they must be */
     IMAGE_WRONG_CALIBRATION_LAYOUT = 7, /* not the one that the application was compiled for */
     IMAGE_WRONG_FIRMWARE_VERSION = 8,   /* made for another application */
-    IMAGE_WRONG_CONTENT = 9             /* header and calibration name different origins */
+    IMAGE_WRONG_CONTENT = 9 /* header and calibration name different origins or lengths */
 } image_status_t;
 
 /* Memory that holds a part, or that an application may use. */

@@ -17,6 +17,7 @@
 #include "kan.h"
 #include "monitor.h"
 #include "network.h"
+#include "pace.h"
 #include "planner.h"
 #include "rcbf.h"
 #include "soc.h"
@@ -26,7 +27,7 @@
 extern "C" {
 #endif
 
-#define BMS_FIRMWARE_VERSION 3
+#define BMS_FIRMWARE_VERSION 4
 #define BMS_TRANSMITTED_MESSAGES 9
 
 typedef enum {
@@ -48,10 +49,13 @@ typedef struct {
     uint32_t periods;
     codec_measurement_t measurement;
     network_t network;
+    pace_t pace;
     bool has_started; /* all messages were valid once, or had the time to become so */
     bool may_start;   /* the request has been off since start-up or the last charge */
     soc_t soc;
     bool soc_known;
+    uint8_t ocv_segment; /* of the table, where the last search ended */
+    float open_circuit_voltage_V; /* of one cell's state of charge, where that is known */
     history_t history;
     thermal_t thermal;
     float coolant_temperature_K; /* last usable reading */
@@ -62,6 +66,9 @@ typedef struct {
     planner_t planner;
     rcbf_decision_t decision;
     float command_A;
+    float growth_A;       /* most that the command may grow by in the coming period */
+    rcbf_active_t limit;  /* that kept it from growing freely, last */
+    rcbf_steadier_t steadier;
     uint8_t counters[BMS_TRANSMITTED_MESSAGES];
     can_frame_t outbox[BMS_TRANSMITTED_MESSAGES];
     uint32_t outbox_length;

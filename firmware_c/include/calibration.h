@@ -16,7 +16,7 @@ extern "C" {
 #endif
 
 /* Raised whenever the layout of bms_calibration_t or of one of its parts changes. */
-#define BMS_CALIBRATION_LAYOUT 4
+#define BMS_CALIBRATION_LAYOUT 5
 
 typedef struct {
     float low;
@@ -46,6 +46,7 @@ typedef struct {
     float reference_current_A; /* strongest current that is ever allowed */
     float current_growth_A; /* most that a charging current may grow by in one period */
     float completion_soc;
+    float soc_error; /* by which the cell may be fuller than counted, when one state decides */
     rcbf_constants_t rcbf;
     plausibility_t plausibility;
     thermal_constants_t thermal;

@@ -138,8 +138,12 @@ typedef struct {
     float commands_A[2]; /* strengths, the last one first */
     float supply_low_A;
     float supply_high_A;
+    float steady_voltage_V; /* at 0 A, with less of the readings' noise in it */
+    float steadied_V;       /* how much more of the voltage is believed than was read */
     float overpotential_V; /* at most */
     float entropic_V;      /* dU/dT times temperature, at most */
+    float cells_slope_V; /* greatest of these grid cells */
+    float cells_entropic_V_per_K;
     float ocv_slope_V;     /* at most */
     float entropic_V_per_K; /* at most */
     float unknown_ocv_slope_V; /* both where the state of charge is not known */

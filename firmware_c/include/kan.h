@@ -40,8 +40,9 @@ typedef struct {
     float high;
 } kan_direction_t;
 
-/* Edges are stored layer by layer, output by output, input by input; an edge has cells + 1 knots
- * and cells * KAN_CELL_COEFFICIENTS coefficients, constant term first. */
+/* Edges are stored layer by layer, output by output, input by input; an edge has cells + 1 knots,
+ * and then for each cell KAN_CELL_COEFFICIENTS, constant term first. What follows the last edge is
+ * never read, and need not exist where the model stands. */
 typedef struct {
     uint32_t layers;
     uint32_t cells;                     /* of every edge */
@@ -57,8 +58,7 @@ typedef struct {
     float input_reach; /* normalised inputs act up to this; beyond 1 they are flagged */
     float output_center_K;
     float output_half_range_K;
-    float knots[KAN_MAX_KNOTS];
-    float coefficients[KAN_MAX_COEFFICIENTS];
+    float tables[KAN_MAX_KNOTS + KAN_MAX_COEFFICIENTS];
 } kan_model_t;
 
 typedef struct {
@@ -69,6 +69,9 @@ typedef struct {
 /* True when sizes fit the maxima, all numbers are finite, all knots rise, and those of the first
  * layer span what inputs reach where they are said to. */
 bool kan_model_is_valid(const kan_model_t *model);
+
+/* Bytes of a model up to the end of its last edge; 0 where its sizes do not fit the maxima. */
+uint32_t kan_model_length(const kan_model_t *model);
 
 /* Edge function number `edge` at x, which is clamped to its knots; beyond them (or for NaN) clears
  * in_domain. The model must be valid. */

@@ -34,15 +34,17 @@ typedef enum {
     FAULT_CORRUPTED_FRAMES = 16, /* frames refused by the end-to-end check */
     FAULT_DECISION_INVALID = 17, /* the decision is not a number */
     FAULT_CALIBRATION = 18, /* calibration missing or damaged */
-    FAULT_SURFACE_DEFICIT = 19 /* surface reads colder than the heat allows */
+    FAULT_SURFACE_DEFICIT = 19, /* surface reads colder than the heat allows */
+    FAULT_OUT_OF_STEP = 20 /* control periods are longer than those of the measurements */
 } fault_t;
 
-#define FAULT_COUNT 20
+#define FAULT_COUNT 21
 #define FAULT_NONE 255
 
 typedef struct {
     uint8_t lasted[FAULT_COUNT];    /* periods without a break, saturating */
     uint16_t returned[FAULT_COUNT]; /* MONITOR_RETURN_PERIODS a time, less those since */
+    uint32_t counting;           /* bit n: a count of fault n above is not 0 */
     uint32_t active;             /* bit n: symptom n seen in this period */
     uint32_t latched;            /* bit n: fault n stands until monitor_reset */
     uint8_t first;               /* fault that latched first, or FAULT_NONE */

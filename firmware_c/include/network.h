@@ -20,6 +20,7 @@ typedef struct {
     e2e_receiver_t receivers[NETWORK_MESSAGES];
     bool is_usable[NETWORK_MESSAGES]; /* in the period that network_step has ended */
     bool is_disturbed;                /* any frame of that period was refused */
+    uint8_t measured_periods; /* since network_step, by the counter of CellElectrical */
 } network_t;
 
 /* Checks a frame and takes its content over when it is good; foreign ones are ignored. */

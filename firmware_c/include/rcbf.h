@@ -87,6 +87,12 @@ typedef struct {
     float margins[RCBF_CONSTRAINTS]; /* left-hand sides at current_A: voltage, soc, core, surface */
 } rcbf_decision_t;
 
+/* What the core's and the surface's condition leave at 0 A, with less of the readings' noise in it. */
+typedef struct {
+    float core_K_per_s;
+    float surface_K_per_s2;
+} rcbf_steadier_t;
+
 /* True when all constants are finite, those that must be positive are, and the table rises. */
 bool rcbf_constants_are_valid(const rcbf_constants_t *constants);
 
@@ -102,6 +108,15 @@ float rcbf_open_circuit_voltage_near_V(const rcbf_constants_t *constants, float 
  * (RCBF_INFEASIBLE) or an input is not finite, out of any physical range, or the reference is
  * above 0 A (RCBF_INVALID). */
 rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t *input);
+
+/* Nothing is remembered. */
+void rcbf_steadier_reset(rcbf_steadier_t *steadier);
+
+/* The same, for one period after the other, where the open-circuit voltage of the input's state of
+ * charge is known: noise of the readings moves the current less. No stronger current than that of
+ * rcbf_solve. */
+rcbf_decision_t rcbf_solve_steadily(const rcbf_constants_t *constants, const rcbf_input_t *input,
+                                    float open_circuit_voltage_V, rcbf_steadier_t *steadier);
 
 #ifdef __cplusplus
 }

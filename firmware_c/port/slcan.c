@@ -2,6 +2,7 @@
 
 #define IDENTIFIER_DIGITS 3u
 #define FRAME_HEAD 5u /* t, identifier, length */
+#define HIGHEST_IDENTIFIER 0x7FFu /* of 11 bits; three digits hold 12 */
 #define MAX_DATA_LENGTH 8u
 
 /* Value of a hexadecimal digit, or more than 15. */
@@ -33,6 +34,7 @@ static bool parse_frame(const slcan_t *slcan, can_frame_t *frame)
 {
     uint32_t length;
     if (!parse_number(&slcan->line[1], IDENTIFIER_DIGITS, &frame->id) ||
+        (frame->id > HIGHEST_IDENTIFIER) ||
         !parse_number(&slcan->line[FRAME_HEAD - 1u], 1u, &length) || (length > MAX_DATA_LENGTH) ||
         (slcan->length != FRAME_HEAD + 2u * length)) {
         return false;

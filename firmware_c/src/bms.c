@@ -9,6 +9,13 @@
 #include "numeric.h"
 #include "request.h"
 
+/* Shares of the preset's growth: with which the current rises after it has met a limit, and what is
+ * added in each period without one. */
+#define LEAST_GROWTH 0.0067f
+#define GROWTH_RISE 0.0133f
+/* With which the current falls to a weaker plan. */
+#define PLAN_FALL 0.25f
+
 /* Periods that the other nodes have to come up before their silence is a fault. */
 #define START_UP_PERIODS 50u
 
@@ -71,6 +78,14 @@ static float within_box(const kan_model_t *model, uint32_t input, float value, f
     return ((value > high) && (value <= high + error)) ? high : value;
 }
 
+static void look_up_voltage(bms_t *bms)
+{
+    if (!has_family(bms)) {
+        bms->open_circuit_voltage_V = rcbf_open_circuit_voltage_near_V(
+            &bms->calibration->rcbf, bms->soc.soc, &bms->ocv_segment);
+    }
+}
+
 static void update_estimates(bms_t *bms)
 {
     const codec_measurement_t *m = &bms->measurement;
@@ -108,6 +123,7 @@ static void update_estimates(bms_t *bms)
         const float commanded_A = is_charging(bms) ? bms->command_A : current_A;
         soc_count(&bms->soc, current_A, commanded_A, calibration->sampling_period_s,
                   calibration->rcbf.capacity_As);
+        look_up_voltage(bms);
     }
 }
 
@@ -128,6 +144,7 @@ static void follow_request(bms_t *bms, uint32_t symptoms)
         }
     } else if ((bms->state == BMS_STANDBY) && bms->may_start && (symptoms == 0u)) {
         soc_set(&bms->soc, bms->measurement.plug_in_soc);
+        look_up_voltage(bms);
         if (has_family(bms)) {
             const family_reading_t reading = reading_of(bms);
             family_begin(&bms->family, &bms->calibration->family, &bms->calibration->rcbf,
@@ -139,16 +156,40 @@ static void follow_request(bms_t *bms, uint32_t symptoms)
     }
 }
 
-/* What is asked for, no more than planned, within the preset's strongest current and its growth in one period. The weaker
- * of two charging currents is the greater number. */
+/* What is asked for, within the preset's strongest current and the growth of one period. To a weaker
+ * plan the current falls gradually, to a weaker request at once. The weaker of two charging currents
+ * is the greater number. */
 static float wanted_current_A(const bms_t *bms)
 {
-    const float asked_A =
-        planner_reference_A(&bms->planner, bms->measurement.reference_current_A);
-    const float strongest_A = bms->calibration->reference_current_A;
-    const float grown_A = bms->command_A - bms->calibration->current_growth_A;
-    const float allowed_A = (grown_A < strongest_A) ? strongest_A : grown_A;
-    return (asked_A < allowed_A) ? allowed_A : asked_A;
+    const bms_calibration_t *calibration = bms->calibration;
+    const float asked_A = bms->measurement.reference_current_A;
+    const float planned_A =
+        numeric_smaller(bms->command_A + PLAN_FALL * calibration->current_growth_A,
+                        planner_reference_A(&bms->planner, asked_A));
+    const float allowed_A = numeric_larger(calibration->reference_current_A,
+                                           bms->command_A - bms->growth_A);
+    /* A request that is no number has to come last, to be refused. */
+    return numeric_larger(allowed_A, numeric_larger(planned_A, asked_A));
+}
+
+/* What a limit allows jitters with the noise of the readings. The current obeys each fall at once,
+ * and so stays on the lower side of that jitter if it rises slowly: where a limit was met it begins
+ * anew with a small growth, and grows faster the longer none is. Until then that limit is the one
+ * that holds it back. */
+static void follow_growth(bms_t *bms)
+{
+    const float most_A = bms->calibration->current_growth_A;
+    if (!is_charging(bms) || bms->monitor.stop) {
+        bms->growth_A = most_A;
+        rcbf_steadier_reset(&bms->steadier);
+    } else if (bms->decision.feasible && (bms->decision.active != RCBF_NONE)) {
+        bms->limit = bms->decision.active;
+        bms->growth_A = LEAST_GROWTH * most_A;
+    } else if (bms->decision.feasible && (bms->growth_A < most_A)) {
+        bms->decision.active = bms->limit;
+        bms->state = BMS_DERATED;
+        bms->growth_A = numeric_smaller(bms->growth_A + GROWTH_RISE * most_A, most_A);
+    }
 }
 
 static bool is_full(const bms_t *bms)
@@ -178,14 +219,17 @@ static void decide(bms_t *bms)
         bms->state = (bms->decision.active == RCBF_NONE) ? BMS_CHARGING : BMS_DERATED;
     } else if (is_charging(bms)) {
         const rcbf_input_t input = {
-            .soc = bms->soc.soc,
+            .soc = bms->soc.soc + calibration->soc_error,
             .core_temperature_K = { .high_K = bms->estimate.core_temperature_K },
             .surface_temperature_K = { .high_K = bms->surface_temperature_K },
             .coolant_temperature_K = { .high_K = m->coolant_temperature_K },
             .cooling_power_W = m->cooling_power_W,
             .reference_current_A = wanted_current_A(bms),
         };
-        bms->decision = rcbf_solve(&calibration->rcbf, &input);
+        bms->decision = rcbf_solve_steadily(&calibration->rcbf, &input,
+                                            rcbf_open_circuit_voltage_V(&calibration->rcbf,
+                                                                        input.soc),
+                                            &bms->steadier);
         bms->state = (bms->decision.active == RCBF_NONE) ? BMS_CHARGING : BMS_DERATED;
     }
 }
@@ -221,6 +265,7 @@ static void run_period(bms_t *bms)
     }
     const bool may_charge = is_charging(bms) && !bms->monitor.stop && bms->decision.feasible;
     bms->command_A = may_charge ? bms->decision.current_A : 0.0f;
+    follow_growth(bms);
 }
 
 static void queue_frames(bms_t *bms)
@@ -261,27 +306,39 @@ static void queue_frames(bms_t *bms)
         .planned_A = -bms->planner.planned_A,
         .predicted_time_to_full_s = bms->planner.time_to_full_s,
     };
-    bms->outbox_length = 0u;
-    bms->outbox_next = 0u;
+    can_frame_t *frame = bms->outbox;
     for (uint32_t i = 0u; i < CAN_TRANSMITTED_COUNT; i++) {
         const bool is_due = (bms->periods % CAN_TRANSMITTED[i].every_periods) == 0u;
         if (!is_due || (CAN_TRANSMITTED[i].is_optional && !bms_has_planned_mode(bms))) {
             continue;
         }
-        can_frame_t *frame = &bms->outbox[bms->outbox_length];
         codec_write(i, &report, frame);
         if (CAN_TRANSMITTED[i].is_protected) {
             e2e_protect(frame->data, frame->length, CAN_TRANSMITTED[i].data_ids,
                         bms->counters[i]);
             bms->counters[i]++;
         }
-        bms->outbox_length++;
+        frame++;
     }
+    bms->outbox_length = (uint32_t)(frame - bms->outbox);
+    bms->outbox_next = 0u;
+}
+
+/* Only a charge counts on its periods, and only what has passed since it began. */
+static void follow_pace(bms_t *bms)
+{
+    if (is_charging(bms)) {
+        pace_step(&bms->pace, bms->network.measured_periods);
+    } else {
+        bms->pace = (pace_t){ 0 };
+    }
+    bms->network.measured_periods = 0u;
 }
 
 void bms_step(bms_t *bms)
 {
     network_step(&bms->network);
+    follow_pace(bms);
     if (bms->calibration != NULL) {
         run_period(bms);
     } else {

@@ -8,17 +8,22 @@
 /* By which the time that is left may differ from the one that a plan has counted down. */
 #define OTHER_TIME_S 120.0f
 
+/* A charger that says nothing of modes is charged as soon as possible. */
+static uint8_t asked_mode(const bms_t *bms)
+{
+    return is_valid(bms, CAN_RECEIVED_CHARGE_MODE) ? bms->measurement.mode
+                                                   : (uint8_t)MODE_FASTEST;
+}
+
 bool bms_has_planned_mode(const bms_t *bms)
 {
-    const uint8_t mode = bms->measurement.mode;
-    return is_valid(bms, CAN_RECEIVED_CHARGE_MODE) &&
-           ((mode == MODE_FASTEST) || (mode == MODE_BY_TIME));
+    const uint8_t mode = asked_mode(bms);
+    return (mode == MODE_FASTEST) || (mode == MODE_BY_TIME);
 }
 
 static float time_left_s(const bms_t *bms)
 {
-    const codec_measurement_t *m = &bms->measurement;
-    return (m->mode == MODE_BY_TIME) ? m->time_to_full_s : NO_TIME_LEFT_S;
+    return (asked_mode(bms) == MODE_BY_TIME) ? bms->measurement.time_to_full_s : NO_TIME_LEFT_S;
 }
 
 static void describe(const bms_t *bms, planner_start_t *start, planner_goal_t *goal)

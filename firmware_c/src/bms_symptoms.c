@@ -11,7 +11,8 @@ static uint32_t symptoms_of_missing_messages(const bms_t *bms)
         [CAN_RECEIVED_COOLANT] = FAULT_COOLANT_MISSING,
         [CAN_RECEIVED_CHARGE_REQUEST] = FAULT_REQUEST_MISSING,
     };
-    uint32_t symptoms = bit_if(bms->network.is_disturbed, FAULT_CORRUPTED_FRAMES);
+    uint32_t symptoms = bit_if(bms->network.is_disturbed, FAULT_CORRUPTED_FRAMES) |
+                        bit_if(pace_is_lost(&bms->pace), FAULT_OUT_OF_STEP);
     for (uint32_t i = 0u; i < CAN_RECEIVED_COUNT; i++) {
         symptoms |= bit_if(!CAN_RECEIVED[i].is_optional && !is_usable(bms, i), MISSING[i]);
     }
@@ -41,8 +42,8 @@ static bool voltage_deviates(const bms_t *bms)
         return !family_voltage_is_plausible(&bms->family, &calibration->family, cell, &reading,
                                             deviation_V);
     }
-    const float model_V = rcbf_open_circuit_voltage_V(cell, bms->soc.soc) -
-                          m->current_A * cell->ohmic_resistance_ohm;
+    const float model_V =
+        bms->open_circuit_voltage_V - m->current_A * cell->ohmic_resistance_ohm;
     return numeric_abs(m->voltage_V - model_V) > deviation_V;
 }
 

@@ -30,7 +30,7 @@ uint32_t codec_encode(const codec_signal_t *signal, float value, codec_rounding_
     const float up = (rounding == CODEC_TOWARDS_ZERO) ? STEP_TOLERANCE : 0.5f;
     /* Rounded before the offset comes on top, in which float32 would lose parts of a step. */
     const int32_t steps =
-        (int32_t)numeric_clamp(numeric_abs(value) / signal->scale + up, 0.0f, MOST_STEPS);
+        (int32_t)numeric_smaller(numeric_abs(value) / signal->scale + up, MOST_STEPS);
     const int32_t raw = ((value < 0.0f) ? -steps : steps) - signal->offset_steps;
     if (raw < 0) {
         return 0u;
@@ -227,8 +227,5 @@ CODEC_APART void codec_write(uint32_t index, const codec_report_t *report, can_f
     };
     frame->id = CAN_TRANSMITTED[index].id;
     frame->length = CAN_TRANSMITTED[index].length;
-    for (uint32_t i = 0u; i < sizeof frame->data; i++) {
-        frame->data[i] = 0u;
-    }
     WRITE[index](report, frame->data);
 }

@@ -5,23 +5,13 @@
 #include "family_tables.h"
 #include "numeric.h"
 
-NUMERIC_INLINE float larger(float a, float b)
-{
-    return (a > b) ? a : b;
-}
-
-NUMERIC_INLINE float smaller(float a, float b)
-{
-    return (a < b) ? a : b;
-}
-
 /* Strongest current that can flow until the end of the hold. */
 NUMERIC_INLINE float strongest_in_hold_A(const family_t *family,
                                          const family_constants_t *constants, float measured_A,
                                          float wanted_A)
 {
-    const float commanded_A = larger(wanted_A, family->supply_high_A);
-    return larger(measured_A, commanded_A * (1.0f + constants->supply_tolerance));
+    const float commanded_A = numeric_larger(wanted_A, family->supply_high_A);
+    return numeric_larger(measured_A, commanded_A * (1.0f + constants->supply_tolerance));
 }
 
 /* Rise of the voltage at a held current within the hold: charge, and branches that fill up. */
@@ -44,7 +34,7 @@ NUMERIC_INLINE float supply_factor(const family_t *family, const family_constant
     if (!(measured_A < most * family->supply_low_A)) {
         return most;
     }
-    return larger(least, measured_A / family->supply_low_A);
+    return numeric_larger(least, measured_A / family->supply_low_A);
 }
 
 NUMERIC_INLINE float voltage_strength_A(const family_constants_t *constants,
@@ -93,14 +83,14 @@ NUMERIC_INLINE float left_W(const core_condition_t *core, float heat_W, float st
 static float core_left_W(const core_condition_t *core, const family_heat_t *heat, float strength_A)
 {
     return left_W(core,
-                  smaller(family_measured_heat_W(heat, strength_A),
+                  numeric_smaller(family_measured_heat_W(heat, strength_A),
                           family_assumed_heat_W(heat, strength_A)),
                   strength_A);
 }
 
 NUMERIC_INLINE float core_strength_A(const core_condition_t *core, const family_heat_t *heat)
 {
-    return larger(family_measured_strength_A(heat, core->square_ohm, core->slope_W_per_A,
+    return numeric_larger(family_measured_strength_A(heat, core->square_ohm, core->slope_W_per_A,
                                              core->outflow_W),
                   family_assumed_strength_A(heat, core->square_ohm, core->slope_W_per_A,
                                             core->outflow_W));
@@ -120,15 +110,16 @@ rcbf_decision_t family_decide(const family_t *family, const family_constants_t *
         !(reference_current_A <= 0.0f) || !(reference_current_A >= -FLT_MAX)) {
         return (rcbf_decision_t){ .active = RCBF_INVALID };
     }
-    const float measured_A = larger(-reading->current_A, 0.0f);
+    const float measured_A = numeric_larger(-reading->current_A, 0.0f);
     family_heat_t heat = family_heat(family, constants, measured_A);
     const float factor = supply_factor(family, constants, heat.at_most_A);
     const float held_A =
         strongest_in_hold_A(family, constants, heat.at_most_A, -reference_current_A);
     const float drifting_V = drift_V(family, constants, held_A);
+    const float above_reading_V = family->steadied_V + drifting_V;
     const float room_V =
-        cell->max_voltage_V - reading->voltage_V - constants->voltage_error_V - drifting_V;
-    heat.overpotential_V += drifting_V;
+        cell->max_voltage_V - reading->voltage_V - constants->voltage_error_V - above_reading_V;
+    heat.overpotential_V += above_reading_V;
 
     float strength_A = -reference_current_A * factor;
     rcbf_active_t active = RCBF_NONE;

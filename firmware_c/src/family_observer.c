@@ -5,18 +5,13 @@
 #include "family_tables.h"
 #include "numeric.h"
 
+/* Of the way to the present voltage that the steadied one goes in a period, and what it keeps above
+ * it on average, as a share of the reading's error; that much noise does not move it at once. */
+#define STEADY_SHARE 0.4f
+#define STEADY_RESERVE 0.5f
+
 /* Periods without usable readings that are bridged. */
 #define MAX_BRIDGED 3u
-
-NUMERIC_INLINE float larger(float a, float b)
-{
-    return (a > b) ? a : b;
-}
-
-NUMERIC_INLINE float smaller(float a, float b)
-{
-    return (a < b) ? a : b;
-}
 
 static void forget_core(family_t *family)
 {
@@ -84,12 +79,12 @@ void family_begin(family_t *family, const family_constants_t *constants,
         const float seen_low =
             soc_at(cell, reading->voltage_V - error_V - family->polarisation_V);
         const float seen_high = soc_at(cell, reading->voltage_V + error_V);
-        low = larger(told_low, seen_low);
-        high = smaller(told_high, seen_high);
+        low = numeric_larger(told_low, seen_low);
+        high = numeric_smaller(told_high, seen_high);
         if (low > high) {
             /* One of both is wrong; nobody knows which. */
-            low = smaller(told_low, seen_low);
-            high = larger(told_high, seen_high);
+            low = numeric_smaller(told_low, seen_low);
+            high = numeric_larger(told_high, seen_high);
         }
     }
     family->soc_low = (soc_counter_t){ low, 0.0f };
@@ -104,8 +99,8 @@ NUMERIC_INLINE void follow_supply(family_t *family, const family_constants_t *co
 {
     const float last_A = family->commands_A[0];
     const float earlier_A = family->commands_A[1];
-    const float low_A = smaller(command_A, smaller(last_A, earlier_A));
-    const float high_A = larger(command_A, larger(last_A, earlier_A));
+    const float low_A = numeric_smaller(command_A, numeric_smaller(last_A, earlier_A));
+    const float high_A = numeric_larger(command_A, numeric_larger(last_A, earlier_A));
     const float rise_A = low_A - family->supply_low_A;
     const float fall_A = high_A - family->supply_high_A;
     family->supply_low_A += (rise_A > 0.0f) ? (constants->supply_share * rise_A) : rise_A;
@@ -137,9 +132,9 @@ static branches_t follow_branches(family_t *family, const family_constants_t *co
         weak_A += ((down_A > 0.0f) ? branch->slow : branch->fast) * down_A;
         family->strong_A[i] = strong_A;
         family->weak_A[i] = weak_A;
-        strongest_A = larger(strongest_A, strong_A);
+        strongest_A = numeric_larger(strongest_A, strong_A);
         all.most_V += branch->resistance_ohm * strong_A;
-        all.rise_V_per_s += branch->drift_ohm_per_s * larger(0.0f, strength_A - weak_A);
+        all.rise_V_per_s += branch->drift_ohm_per_s * numeric_larger(0.0f, strength_A - weak_A);
     }
     family->strongest_A = strongest_A;
     return all;
@@ -151,8 +146,8 @@ NUMERIC_INLINE branches_t follow_charge(family_t *family, const family_constants
 {
     const float error_A = constants->current_error_A;
     const float before_A = family->strength_A;
-    const float least_A = larger(smaller(strength_A, before_A) - error_A, 0.0f);
-    const float most_A = larger(before_A, strength_A) + error_A;
+    const float least_A = numeric_larger(numeric_smaller(strength_A, before_A) - error_A, 0.0f);
+    const float most_A = numeric_larger(before_A, strength_A) + error_A;
     family->strength_A = strength_A;
     soc_add(&family->soc_low, least_A * constants->least_soc_per_A);
     soc_add(&family->soc_high, most_A * constants->greatest_soc_per_A);
@@ -179,7 +174,7 @@ NUMERIC_INLINE void look_up(family_t *family, const family_constants_t *constant
         ((family->entropic_V_per_K > 0.0f) ? cell->max_core_temperature_K.high_K
                                            : constants->coldest_core_K);
     family->overpotential_V =
-        larger(0.0f, reading->voltage_V -
+        numeric_larger(0.0f, reading->voltage_V -
                          rcbf_open_circuit_voltage_near_V(cell, low, &family->ocv_segment) +
                          constants->ocv_error_V + constants->voltage_error_V +
                          2.0f * family->rest_polarisation_V);
@@ -193,8 +188,8 @@ NUMERIC_INLINE void follow_polarisation(family_t *family, const family_constants
 {
     const float risen_V = family->polarisation_V + constants->period_s * branches->rise_V_per_s;
     const float seen_V =
-        larger(0.0f, family->overpotential_V - constants->least_resistance_ohm * at_least_A);
-    family->polarisation_V = smaller(branches->most_V, smaller(risen_V, seen_V));
+        numeric_larger(0.0f, family->overpotential_V - constants->least_resistance_ohm * at_least_A);
+    family->polarisation_V = numeric_smaller(branches->most_V, numeric_smaller(risen_V, seen_V));
 }
 
 family_heat_t family_heat(const family_t *family, const family_constants_t *constants,
@@ -202,7 +197,7 @@ family_heat_t family_heat(const family_t *family, const family_constants_t *cons
 {
     return (family_heat_t){
         .overpotential_V = family->overpotential_V,
-        .at_least_A = larger(strength_A - constants->current_error_A, 0.0f),
+        .at_least_A = numeric_larger(strength_A - constants->current_error_A, 0.0f),
         .at_most_A = strength_A + constants->current_error_A,
         .past_A = family->strongest_A,
         .resistance_ohm = family->resistance_ohm,
@@ -221,19 +216,19 @@ NUMERIC_INLINE void follow_core(family_t *family, const family_constants_t *cons
                                 const family_heat_t *heat)
 {
     const float strength_A = heat->at_most_A;
-    const float heat_W = smaller(family_measured_heat_W(heat, strength_A),
+    const float heat_W = numeric_smaller(family_measured_heat_W(heat, strength_A),
                                  family_assumed_heat_W(heat, strength_A)) +
                          family->entropic_V * strength_A;
     const float surface_K =
-        larger(reading->surface_temperature_K, family->surface_temperature_K);
+        numeric_larger(reading->surface_temperature_K, family->surface_temperature_K);
     const float surface_room_K = (cell->max_core_temperature_K.high_K - surface_K) +
                                  cell->max_core_temperature_K.low_K - constants->surface_error_K;
-    family->core_room_K = smaller(family->core_room_K, surface_room_K);
+    family->core_room_K = numeric_smaller(family->core_room_K, surface_room_K);
     const float disturbance_W =
         constants->disturbance_W +
         strength_A * (constants->disturbance_W_per_A +
                       strength_A * constants->disturbance_W_per_A2);
-    const float net_W = larger(heat_W, family->heat_W) + disturbance_W -
+    const float net_W = numeric_larger(heat_W, family->heat_W) + disturbance_W -
                         constants->outflow_W_per_K * (surface_room_K - family->core_room_K);
     family->core_room_K -=
         ((net_W > 0.0f) ? constants->heating_K_per_W : constants->cooling_K_per_W) * net_W;
@@ -267,7 +262,7 @@ static void bridge(family_t *family, const family_constants_t *constants)
     }
     const float strength_A = family->supply_high_A * (1.0f + constants->supply_tolerance);
     const family_heat_t heat = {
-        .past_A = larger(strength_A, family->strongest_A),
+        .past_A = numeric_larger(strength_A, family->strongest_A),
         .resistance_ohm = constants->resistance_ohm[0],
         .polarisation_ohm = constants->polarisation_ohm,
     };
@@ -278,16 +273,31 @@ static void bridge(family_t *family, const family_constants_t *constants)
     family->strength_A = strength_A;
     family->core_room_K -=
         constants->heating_K_per_W *
-        (family_assumed_heat_W(&heat, strength_A) + larger(0.0f, family->entropic_V) * strength_A +
+        (family_assumed_heat_W(&heat, strength_A) + numeric_larger(0.0f, family->entropic_V) * strength_A +
          constants->disturbance_W +
          strength_A * (constants->disturbance_W_per_A +
                        strength_A * constants->disturbance_W_per_A2));
 }
 
+/* The voltage less the least ohmic drop, steadied: never less than was read, so that only current is
+ * lost by it. What is no number gives way to the reading. */
+NUMERIC_INLINE void steady_voltage(family_t *family, const family_constants_t *constants,
+                                   float voltage_V, float strength_A)
+{
+    const float read_V = voltage_V - constants->least_resistance_ohm * strength_A;
+    float steady_V = family->steady_voltage_V;
+    steady_V += STEADY_SHARE * (read_V + STEADY_RESERVE * constants->voltage_error_V - steady_V);
+    if (!(steady_V >= read_V)) {
+        steady_V = read_V;
+    }
+    family->steady_voltage_V = steady_V;
+    family->steadied_V = steady_V - read_V;
+}
+
 void family_observe(family_t *family, const family_constants_t *constants,
                     const rcbf_constants_t *cell, const family_reading_t *reading)
 {
-    follow_supply(family, constants, larger(-reading->command_A, 0.0f));
+    follow_supply(family, constants, numeric_larger(-reading->command_A, 0.0f));
     family->resistance_ohm = family_resistance_ohm(
         constants, reading->surface_temperature_K - constants->surface_error_K);
     if (!reading->is_usable) {
@@ -295,12 +305,13 @@ void family_observe(family_t *family, const family_constants_t *constants,
         return;
     }
     family->bridged = 0u;
-    const float strength_A = larger(-reading->current_A, 0.0f);
+    const float strength_A = numeric_larger(-reading->current_A, 0.0f);
     const branches_t branches = follow_charge(family, constants, strength_A);
     look_up(family, constants, cell, reading);
     const family_heat_t heat = family_heat(family, constants, strength_A);
     follow_polarisation(family, constants, &branches, heat.at_least_A);
     look_for_full(family, constants, reading, heat.at_most_A);
+    steady_voltage(family, constants, reading->voltage_V, strength_A);
     const bool rests = is_at_rest(constants, reading);
     if (!rests && !reading->is_charging) {
         forget_after_load(family, constants);

@@ -1,18 +1,9 @@
 #include "family_tables.h"
 
 #include <math.h>
+#include <stddef.h>
 
 #include "numeric.h"
-
-static float smaller(float a, float b)
-{
-    return (a < b) ? a : b;
-}
-
-static float larger(float a, float b)
-{
-    return (a > b) ? a : b;
-}
 
 float family_resistance_ohm(const family_constants_t *constants, float temperature_K)
 {
@@ -39,7 +30,7 @@ float family_greatest(const float *cells, uint32_t first, uint32_t end)
     const float *last = &cells[end - 1u];
     float greatest = *last;
     for (const float *cell = &cells[first]; cell < last; cell++) {
-        greatest = larger(greatest, *cell);
+        greatest = numeric_larger(greatest, *cell);
     }
     return greatest;
 }
@@ -54,7 +45,15 @@ static float greatest_of(const float *cells, float greatest, uint32_t was_first,
     for (uint32_t i = was_first; is_known && (i < first); i++) {
         is_known = cells[i] < greatest;
     }
-    return is_known ? larger(greatest, cells[end - 1u]) : family_greatest(cells, first, end);
+    return is_known ? numeric_larger(greatest, cells[end - 1u]) : family_greatest(cells, first, end);
+}
+
+/* In the last quarter of the last cell it goes on towards the next one's, so that no bound jumps where
+ * that begins. */
+static float towards_next(const float *cells, float greatest, uint32_t end, float share)
+{
+    const float rise = (end < FAMILY_SOC_CELLS) ? numeric_larger(0.0f, cells[end] - greatest) : 0.0f;
+    return greatest + share * rise;
 }
 
 void family_look_up_cells(family_t *family, const family_constants_t *constants, float soc_low,
@@ -65,14 +64,19 @@ void family_look_up_cells(family_t *family, const family_constants_t *constants,
     const uint32_t was_first = family->first_cell;
     const uint32_t was_end = family->end_cell;
     if ((first != was_first) || (end != was_end)) {
-        family->ocv_slope_V = greatest_of(constants->ocv_slope_V, family->ocv_slope_V, was_first,
+        family->cells_slope_V = greatest_of(constants->ocv_slope_V, family->cells_slope_V, was_first,
                                           was_end, first, end);
-        family->entropic_V_per_K = greatest_of(constants->entropic_V_per_K,
-                                               family->entropic_V_per_K, was_first, was_end,
+        family->cells_entropic_V_per_K = greatest_of(constants->entropic_V_per_K,
+                                               family->cells_entropic_V_per_K, was_first, was_end,
                                                first, end);
         family->first_cell = (uint8_t)first;
         family->end_cell = (uint8_t)end;
     }
+    const float share = numeric_clamp(
+        4.0f * (soc_high * (float)FAMILY_SOC_CELLS - (float)end) + 1.0f, 0.0f, 1.0f);
+    family->ocv_slope_V = towards_next(constants->ocv_slope_V, family->cells_slope_V, end, share);
+    family->entropic_V_per_K = towards_next(constants->entropic_V_per_K,
+                                            family->cells_entropic_V_per_K, end, share);
 }
 
 float family_rise_V_per_s(const family_t *family, const family_constants_t *constants,
@@ -81,7 +85,7 @@ float family_rise_V_per_s(const family_t *family, const family_constants_t *cons
     float rise_V_per_s = 0.0f;
     for (uint32_t i = 0u; i < constants->branches; i++) {
         rise_V_per_s += constants->branch[i].drift_ohm_per_s *
-                        larger(0.0f, strength_A - family->weak_A[i]);
+                        numeric_larger(0.0f, strength_A - family->weak_A[i]);
     }
     return rise_V_per_s;
 }
@@ -116,16 +120,16 @@ float family_mapped_A(const family_map_t *map, float temperature_K, float soc)
  * where eta is the overpotential at a_m. The worst a_m is the least, the worst R0 an end. */
 float family_measured_heat_W(const family_heat_t *heat, float strength_A)
 {
-    const float past_A = larger(strength_A, heat->past_A);
+    const float past_A = numeric_larger(strength_A, heat->past_A);
     const float squared = strength_A * strength_A;
     const float more = heat->resistance_ohm * (squared - past_A * heat->at_least_A);
     const float less = heat->least_resistance_ohm * (squared - past_A * heat->at_least_A);
-    return past_A * heat->overpotential_V + larger(more, less);
+    return past_A * heat->overpotential_V + numeric_larger(more, less);
 }
 
 float family_assumed_heat_W(const family_heat_t *heat, float strength_A)
 {
-    const float past_A = larger(strength_A, heat->past_A);
+    const float past_A = numeric_larger(strength_A, heat->past_A);
     return heat->resistance_ohm * strength_A * strength_A +
            heat->polarisation_ohm * past_A * past_A;
 }
@@ -154,7 +158,7 @@ float family_measured_strength_A(const family_heat_t *heat, float square, float 
     const float less_A =
         root_A(heat->least_resistance_ohm + square, slope,
                limit_W - past_A * (eta_V - heat->least_resistance_ohm * heat->at_least_A));
-    return smaller(grown_A, smaller(more_A, less_A));
+    return numeric_smaller(grown_A, numeric_smaller(more_A, less_A));
 }
 
 float family_assumed_strength_A(const family_heat_t *heat, float square, float slope,
@@ -162,23 +166,8 @@ float family_assumed_strength_A(const family_heat_t *heat, float square, float s
 {
     const float together_ohm = heat->resistance_ohm + heat->polarisation_ohm;
     const float past_W = heat->polarisation_ohm * heat->past_A * heat->past_A;
-    return smaller(root_A(together_ohm + square, slope, limit_W),
+    return numeric_smaller(root_A(together_ohm + square, slope, limit_W),
                    root_A(heat->resistance_ohm + square, slope, limit_W - past_W));
-}
-
-static bool is_positive(float value)
-{
-    return (value > 0.0f) && (value <= FLT_MAX);
-}
-
-static bool is_not_negative(float value)
-{
-    return (value >= 0.0f) && (value <= FLT_MAX);
-}
-
-static bool is_share(float value)
-{
-    return (value > 0.0f) && (value <= 1.0f);
 }
 
 static bool map_is_valid(const family_map_t *map)
@@ -188,7 +177,7 @@ static bool map_is_valid(const family_map_t *map)
                  numeric_rises(map->temperature_K, map->temperatures) &&
                  numeric_rises(map->soc, map->charges);
     for (uint32_t i = 0u; valid && (i < map->temperatures * map->charges); i++) {
-        valid = is_not_negative(map->strength_A[i]);
+        valid = numeric_is_within(map->strength_A[i], 0.0f, FLT_MAX);
     }
     return valid;
 }
@@ -198,50 +187,62 @@ static bool branches_are_valid(const family_constants_t *k)
     bool valid = k->branches <= FAMILY_MAX_BRANCHES;
     for (uint32_t i = 0u; valid && (i < k->branches); i++) {
         const family_branch_t *branch = &k->branch[i];
-        valid = is_share(branch->slow) && is_share(branch->fast) &&
-                is_not_negative(branch->resistance_ohm) &&
-                is_not_negative(branch->drift_ohm_per_s);
+        valid = numeric_is_within(branch->slow, NUMERIC_LEAST, 1.0f) &&
+                numeric_is_within(branch->fast, NUMERIC_LEAST, 1.0f) &&
+                numeric_is_within(branch->resistance_ohm, 0.0f, FLT_MAX) &&
+                numeric_is_within(branch->drift_ohm_per_s, 0.0f, FLT_MAX);
+    }
+    return valid;
+}
+
+#define AT(member) ((uint16_t)offsetof(family_constants_t, member))
+
+/* Greatest at each temperature and at all warmer ones. */
+static bool resistances_are_valid(const family_constants_t *k)
+{
+    bool valid = true;
+    float colder_ohm = FLT_MAX;
+    for (uint32_t i = 0u; i < FAMILY_TEMPERATURES; i++) {
+        valid = valid && numeric_is_within(k->resistance_ohm[i], k->least_resistance_ohm,
+                                           colder_ohm);
+        colder_ohm = k->resistance_ohm[i];
     }
     return valid;
 }
 
 bool family_constants_are_valid(const family_constants_t *k)
 {
-    if (k->is_stated == 0u) {
-        return true;
-    }
-    const float positive[] = { k->least_soc_per_A,  k->greatest_soc_per_A, k->hold_soc_per_A,
-                               k->coldest_K,        k->per_step_K,         k->least_resistance_ohm,
-                               k->outflow_W_per_K,  k->core_K_per_J,       k->heating_K_per_W,
-                               k->cooling_K_per_W,  k->coldest_core_K,     k->hold_s,
-                               k->period_s,         k->full_ocv_V,       k->estimate_error_K };
-    const float not_negative[] = { k->plug_in_error,        k->ocv_error_V,
-                                   k->polarisation_ohm,     k->rest_polarisation_V,
-                                   k->rest_drift_per_s,     k->inner_K,
-                                   k->disturbance_W,        k->disturbance_W_per_A,
-                                   k->disturbance_W_per_A2, k->hold_W,
-                                   k->per_surface_rise,     k->per_coolant_gap,
-                                   k->rest_error_K,         k->least_per_surface_rise,
-                                   k->most_per_surface_fall, k->least_per_coolant_gap,
-                                   k->charge_error_K,       k->supply_tolerance,
-                                   k->current_error_A,      k->voltage_error_V,
-                                   k->surface_error_K,      k->coolant_error_K };
-    bool valid = (k->gain_W_per_K >= k->outflow_W_per_K) && (k->gain_W_per_K <= FLT_MAX) &&
-                 (k->supply_tolerance < 1.0f) && is_share(k->supply_share) &&
-                 is_share(k->relaxation) && (k->rest_periods >= 1u) &&
-                 (k->charge_periods >= 1u) && (k->full_periods >= 1u);
-    for (uint32_t i = 0u; i < sizeof positive / sizeof positive[0]; i++) {
-        valid = valid && is_positive(positive[i]);
-    }
-    for (uint32_t i = 0u; i < sizeof not_negative / sizeof not_negative[0]; i++) {
-        valid = valid && is_not_negative(not_negative[i]);
-    }
-    for (uint32_t i = 0u; i < FAMILY_TEMPERATURES; i++) {
-        valid = valid && (k->resistance_ohm[i] >= k->least_resistance_ohm) &&
-                is_positive(k->resistance_ohm[i]) &&
-                ((i == 0u) || (k->resistance_ohm[i] <= k->resistance_ohm[i - 1u]));
-    }
-    return valid && numeric_all_finite(k->ocv_slope_V, FAMILY_SOC_CELLS) &&
-           numeric_all_finite(k->entropic_V_per_K, FAMILY_SOC_CELLS) && branches_are_valid(k) &&
-           map_is_valid(&k->map);
+    static const uint16_t POSITIVE[] = {
+        AT(least_soc_per_A), AT(greatest_soc_per_A), AT(hold_soc_per_A),
+        AT(coldest_K),       AT(per_step_K),         AT(least_resistance_ohm),
+        AT(outflow_W_per_K), AT(core_K_per_J),       AT(heating_K_per_W),
+        AT(cooling_K_per_W), AT(coldest_core_K),     AT(hold_s),
+        AT(period_s),        AT(full_ocv_V),         AT(estimate_error_K),
+    };
+    static const uint16_t NOT_NEGATIVE[] = {
+        AT(plug_in_error),        AT(ocv_error_V),
+        AT(polarisation_ohm),     AT(rest_polarisation_V),
+        AT(rest_drift_per_s),     AT(inner_K),
+        AT(disturbance_W),        AT(disturbance_W_per_A),
+        AT(disturbance_W_per_A2), AT(hold_W),
+        AT(per_surface_rise),     AT(per_coolant_gap),
+        AT(rest_error_K),         AT(least_per_surface_rise),
+        AT(most_per_surface_fall), AT(least_per_coolant_gap),
+        AT(charge_error_K),       AT(supply_tolerance),
+        AT(current_error_A),      AT(voltage_error_V),
+        AT(surface_error_K),      AT(coolant_error_K),
+    };
+    static const uint16_t SHARES[] = { AT(supply_share), AT(relaxation) };
+    return (k->is_stated == 0u) ||
+           (numeric_members_are_within(k, POSITIVE, NUMERIC_COUNT(POSITIVE), NUMERIC_LEAST,
+                                       FLT_MAX) &&
+            numeric_members_are_within(k, NOT_NEGATIVE, NUMERIC_COUNT(NOT_NEGATIVE), 0.0f,
+                                       FLT_MAX) &&
+            numeric_members_are_within(k, SHARES, NUMERIC_COUNT(SHARES), NUMERIC_LEAST, 1.0f) &&
+            numeric_is_within(k->gain_W_per_K, k->outflow_W_per_K, FLT_MAX) &&
+            (k->supply_tolerance < 1.0f) && (k->rest_periods >= 1u) &&
+            (k->charge_periods >= 1u) && (k->full_periods >= 1u) && resistances_are_valid(k) &&
+            numeric_all_finite(k->ocv_slope_V, FAMILY_SOC_CELLS) &&
+            numeric_all_finite(k->entropic_V_per_K, FAMILY_SOC_CELLS) && branches_are_valid(k) &&
+            map_is_valid(&k->map));
 }

@@ -3,11 +3,6 @@
 #include "family_tables.h"
 #include "numeric.h"
 
-static float larger(float a, float b)
-{
-    return (a > b) ? a : b;
-}
-
 static void add_to(family_window_t *window, const family_reading_t *reading)
 {
     const float surface_K = reading->surface_temperature_K;
@@ -34,11 +29,11 @@ void family_look_at_rest(family_t *family, const family_constants_t *constants,
     const float share = 1.0f / (float)window->count;
     const float mean_K = window->first_K + share * window->sum_K;
     const float above_K =
-        larger(0.0f, surface_K - window->first_K) * constants->per_surface_rise +
-        larger(0.0f, share * window->gap_K) * constants->per_coolant_gap;
+        numeric_larger(0.0f, surface_K - window->first_K) * constants->per_surface_rise +
+        numeric_larger(0.0f, share * window->gap_K) * constants->per_coolant_gap;
     const float heated_K = (float)window->count * constants->heating_K_per_W * family->heat_W;
     const float hottest_K =
-        larger(surface_K, mean_K + above_K) + constants->rest_error_K + larger(0.0f, heated_K);
+        numeric_larger(surface_K, mean_K + above_K) + constants->rest_error_K + numeric_larger(0.0f, heated_K);
     const float room_K = (cell->max_core_temperature_K.high_K - hottest_K) +
                          cell->max_core_temperature_K.low_K;
     if (!family->core_is_known || (room_K > family->core_room_K)) {

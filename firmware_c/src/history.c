@@ -46,7 +46,7 @@ bool history_is_settling(const history_t *history, const kan_model_t *model)
 kan_estimate_t history_estimate(const history_t *history, const kan_model_t *model,
                                 const float *measured)
 {
-    float inputs[KAN_MAX_WIDTH] = { 0.0f };
+    float inputs[KAN_MAX_WIDTH];
     for (uint32_t i = 0u; i < KAN_MEASURED_INPUTS; i++) {
         inputs[i] = measured[i];
     }

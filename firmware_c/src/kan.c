@@ -1,6 +1,7 @@
 #include "kan.h"
 
 #include <math.h>
+#include <stddef.h>
 
 #include "numeric.h"
 
@@ -33,6 +34,27 @@ static bool sizes_fit(const kan_model_t *model)
            (model->directions <= KAN_MAX_DIRECTIONS) &&
            (edges * (model->cells + 1u) <= KAN_MAX_KNOTS) &&
            (edges * model->cells * KAN_CELL_COEFFICIENTS <= KAN_MAX_COEFFICIENTS);
+}
+
+/* Numbers in the tables of an edge. */
+NUMERIC_INLINE uint32_t edge_numbers(uint32_t cells)
+{
+    return cells + 1u + cells * KAN_CELL_COEFFICIENTS;
+}
+
+/* Where the coefficients of an edge's last cell stand in its tables. */
+NUMERIC_INLINE uint32_t last_coefficients(uint32_t cells)
+{
+    return cells + 1u + (cells - 1u) * KAN_CELL_COEFFICIENTS;
+}
+
+uint32_t kan_model_length(const kan_model_t *model)
+{
+    if (!sizes_fit(model)) {
+        return 0u;
+    }
+    return (uint32_t)(offsetof(kan_model_t, tables) +
+                      edge_count(model) * edge_numbers(model->cells) * sizeof model->tables[0]);
 }
 
 static bool memory_is_valid(const kan_model_t *model)
@@ -71,14 +93,13 @@ bool kan_model_is_valid(const kan_model_t *model)
     const uint32_t edges = edge_count(model);
     const uint32_t from_inputs = model->width[0] * model->width[1];
     for (uint32_t edge = 0u; edge < edges; edge++) {
-        const float *knots = &model->knots[edge * (model->cells + 1u)];
+        const float *knots = &model->tables[edge * edge_numbers(model->cells)];
         valid = valid && numeric_rises(knots, model->cells + 1u) &&
                 ((model->spans_reach == 0u) || (edge >= from_inputs) ||
                  ((knots[0] <= -model->input_reach) &&
                   (knots[model->cells] >= model->input_reach)));
     }
-    return valid && numeric_all_finite(model->coefficients,
-                                       edges * model->cells * KAN_CELL_COEFFICIENTS);
+    return valid && numeric_all_finite(model->tables, edges * edge_numbers(model->cells));
 }
 
 typedef char kan_horner_has_all_coefficients[(KAN_CELL_COEFFICIENTS == 8) ? 1 : -1];
@@ -113,9 +134,9 @@ NUMERIC_INLINE float clamped(float first, float last, float x, bool *in_domain)
 float kan_edge_value(const kan_model_t *model, uint32_t edge, float x, bool *in_domain)
 {
     const uint32_t cells = model->cells;
-    const float *knots = &model->knots[edge * (cells + 1u)];
-    const float *last = &model->coefficients[((edge + 1u) * cells - 1u) * KAN_CELL_COEFFICIENTS];
-    return value_within(&knots[cells - 1u], last, clamped(knots[0], knots[cells], x, in_domain));
+    const float *knots = &model->tables[edge * edge_numbers(cells)];
+    return value_within(&knots[cells - 1u], &knots[last_coefficients(cells)],
+                        clamped(knots[0], knots[cells], x, in_domain));
 }
 
 #define BLOCK 4u
@@ -161,12 +182,12 @@ static bool clamp_to_reach(const kan_model_t *model, float *nodes)
     return in_domain;
 }
 
-/* The tables of an edge's last cell, and the steps to those of the next edge. */
+/* The tables of an edge's last cell, and the step to those of the next edge. */
 typedef struct {
     const float *knot;
     const float *c;
-    uint32_t knots;
-    uint32_t coefficients;
+    uint32_t cells;
+    uint32_t numbers;
 } edge_walk_t;
 
 /* Sum of the edges that lead from all nodes to one; nodes that the knots span need no clamping. */
@@ -181,11 +202,11 @@ NUMERIC_INLINE float sum_of_edges(edge_walk_t *walk, const float *nodes, const f
         nodes++;
         if (!is_spanned) {
             const float *const last = &knot[1];
-            x = clamped(*(last + 1u - walk->knots), *last, x, in_domain);
+            x = clamped(*(last - walk->cells), *last, x, in_domain);
         }
         sum += value_within(knot, c, x);
-        knot += walk->knots;
-        c += walk->coefficients;
+        knot += walk->numbers;
+        c += walk->numbers;
     } while (nodes < end);
     walk->knot = knot;
     walk->c = c;
@@ -227,9 +248,8 @@ kan_estimate_t kan_evaluate(const kan_model_t *model, const float *inputs)
         in_domain = false;
     }
     const uint32_t cells = model->cells;
-    edge_walk_t walk = { &model->knots[cells - 1u],
-                         &model->coefficients[(cells - 1u) * KAN_CELL_COEFFICIENTS], cells + 1u,
-                         cells * KAN_CELL_COEFFICIENTS };
+    edge_walk_t walk = { &model->tables[cells - 1u], &model->tables[last_coefficients(cells)],
+                         cells, edge_numbers(cells) };
     const uint32_t *width = &model->width[1];
     const bool is_spanned = model->spans_reach != 0u;
     for (uint32_t to = 0u; to < *width; to++) {

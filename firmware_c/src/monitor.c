@@ -19,10 +19,11 @@ const fault_policy_t MONITOR_POLICY[FAULT_COUNT] = {
     [FAULT_OVER_VOLTAGE] = { 2u, true, 3u },
     [FAULT_CORE_OVER_TEMPERATURE] = { 2u, true, 3u },
     [FAULT_SURFACE_OVER_TEMPERATURE] = { 2u, true, 3u },
-    [FAULT_CORRUPTED_FRAMES] = { 3u, false, 0u },
+    [FAULT_CORRUPTED_FRAMES] = { 3u, false, 5u },
     [FAULT_DECISION_INVALID] = { 2u, true, 0u },
     [FAULT_CALIBRATION] = { 1u, true, 0u },
     [FAULT_SURFACE_DEFICIT] = { 5u, true, 0u },
+    [FAULT_OUT_OF_STEP] = { 1u, true, 0u },
 };
 
 void monitor_reset(monitor_t *monitor)
@@ -31,19 +32,22 @@ void monitor_reset(monitor_t *monitor)
         monitor->lasted[fault] = 0u;
         monitor->returned[fault] = 0u;
     }
+    monitor->counting = 0u;
     monitor->active = 0u;
     monitor->latched = 0u;
     monitor->first = FAULT_NONE;
     monitor->stop = false;
 }
 
+#define BIT(fault) ((uint32_t)1u << (uint32_t)(fault))
+
+/* Those whose row says that they do not stop at once. */
+#define GOES_ON \
+    (BIT(FAULT_CURRENT_DEVIATION) | BIT(FAULT_VOLTAGE_DEVIATION) | BIT(FAULT_CORRUPTED_FRAMES))
+
 bool monitor_stops(uint32_t symptoms)
 {
-    bool stops = false;
-    for (uint32_t fault = 0u; fault < FAULT_COUNT; fault++) {
-        stops = stops || (MONITOR_POLICY[fault].stops_at_once && ((symptoms >> fault & 1u) != 0u));
-    }
-    return stops;
+    return (symptoms & ((BIT(FAULT_COUNT) - 1u) & ~GOES_ON)) != 0u;
 }
 
 static void latch(monitor_t *monitor, uint32_t fault)
@@ -51,7 +55,7 @@ static void latch(monitor_t *monitor, uint32_t fault)
     if (monitor->latched == 0u) {
         monitor->first = (uint8_t)fault;
     }
-    monitor->latched |= (uint32_t)1u << fault;
+    monitor->latched |= BIT(fault);
 }
 
 /* Counts a symptom that begins anew; what has not come back for long is forgotten little by little,
@@ -70,27 +74,41 @@ static void count_return(monitor_t *monitor, uint32_t fault)
     }
 }
 
+static void count_period(monitor_t *monitor, uint32_t fault)
+{
+    if (monitor->lasted[fault] == 0u) {
+        count_return(monitor, fault);
+    }
+    if (monitor->lasted[fault] < UINT8_MAX) {
+        monitor->lasted[fault]++;
+    }
+    if (monitor->lasted[fault] >= MONITOR_POLICY[fault].debounce_periods) {
+        latch(monitor, fault);
+    }
+}
+
 void monitor_step(monitor_t *monitor, uint32_t symptoms)
 {
+    /* What is not seen and has nothing to forget stays as it is. */
+    uint32_t moving = symptoms | monitor->counting;
+    uint32_t counting = 0u;
     monitor->active = symptoms;
     monitor->stop = monitor_stops(symptoms);
-    for (uint32_t fault = 0u; fault < FAULT_COUNT; fault++) {
-        const uint32_t bit = (uint32_t)1u << fault;
+    for (uint32_t fault = 0u; (fault < FAULT_COUNT) && (moving != 0u); fault++, moving >>= 1u) {
+        if ((moving & 1u) == 0u) {
+            continue;
+        }
         if (monitor->returned[fault] > 0u) {
             monitor->returned[fault]--;
         }
-        if ((symptoms & bit) == 0u) {
+        if ((symptoms & BIT(fault)) != 0u) {
+            count_period(monitor, fault);
+        } else {
             monitor->lasted[fault] = 0u;
-            continue;
         }
-        if (monitor->lasted[fault] == 0u) {
-            count_return(monitor, fault);
-        }
-        if (monitor->lasted[fault] < UINT8_MAX) {
-            monitor->lasted[fault]++;
-        }
-        if (monitor->lasted[fault] >= MONITOR_POLICY[fault].debounce_periods) {
-            latch(monitor, fault);
+        if ((monitor->lasted[fault] != 0u) || (monitor->returned[fault] != 0u)) {
+            counting |= BIT(fault);
         }
     }
+    monitor->counting = counting;
 }

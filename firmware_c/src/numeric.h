@@ -13,9 +13,40 @@
 #define NUMERIC_INLINE static inline
 #endif
 
+#define NUMERIC_INFINITY_BITS 0x7F800000u
+/* Least number above 0 that float32 has. */
+#define NUMERIC_LEAST 0x1p-149f
+
+/* Numbers from 0 up compare as their bits do, and NaN comes after all of them. */
+NUMERIC_INLINE uint32_t numeric_bits(float value)
+{
+    const union {
+        float value;
+        uint32_t bits;
+    } both = { value };
+    return both.bits;
+}
+
+/* The sign is shifted out. */
 static inline bool numeric_is_finite(float value)
 {
-    return (value >= -FLT_MAX) && (value <= FLT_MAX);
+    return (numeric_bits(value) << 1u) < (NUMERIC_INFINITY_BITS << 1u);
+}
+
+NUMERIC_INLINE float numeric_larger(float a, float b)
+{
+    return (a > b) ? a : b;
+}
+
+NUMERIC_INLINE float numeric_smaller(float a, float b)
+{
+    return (a < b) ? a : b;
+}
+
+/* False for NaN. */
+static inline bool numeric_is_within(float value, float low, float high)
+{
+    return (value >= low) && (value <= high);
 }
 
 /* low for NaN. */
@@ -56,6 +87,20 @@ static inline bool numeric_all_finite(const float *values, uint32_t count)
     }
     return finite;
 }
+
+/* True when the members of a structure at these offsets, all of them float, are within. */
+static inline bool numeric_members_are_within(const void *structure, const uint16_t *offsets,
+                                              uint32_t count, float low, float high)
+{
+    bool within = true;
+    for (uint32_t i = 0u; i < count; i++) {
+        const void *member = (const uint8_t *)structure + offsets[i];
+        within = within && numeric_is_within(*(const float *)member, low, high);
+    }
+    return within;
+}
+
+#define NUMERIC_COUNT(array) ((uint32_t)(sizeof(array) / sizeof (array)[0]))
 
 /* True when the values are finite and each is above the one before. */
 static inline bool numeric_rises(const float *values, uint32_t count)

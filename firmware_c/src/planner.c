@@ -30,17 +30,16 @@ bool planner_constants_are_valid(const planner_constants_t *constants)
 
 void planner_reset(planner_t *planner)
 {
-    *planner = (planner_t){ .age_s = SEARCH_EVERY_S, .planned_A = NAN, .time_to_full_s = NAN };
+    /* What a search needs, it sets when it begins. */
+    planner->is_searching = false;
+    planner->age_s = SEARCH_EVERY_S;
+    planner->planned_A = NAN;
+    planner->time_to_full_s = NAN;
 }
 
 bool planner_is_due(const planner_t *planner)
 {
     return !planner->is_searching && (planner->age_s >= SEARCH_EVERY_S);
-}
-
-static float weaker(float a, float b)
-{
-    return (a < b) ? a : b;
 }
 
 /* Largest strength with constant - slope v - square v^2 >= 0. */
@@ -78,7 +77,7 @@ static float cell_limit_A(const planner_t *planner, const rcbf_constants_t *k, f
                    k->a10_K_per_Ws2 * planner->start.cooling_power_W - k->delta4_K_per_s2 -
                    k->surface_margin_K_per_s2 - numeric_abs(k->a4_per_s2) * e_K,
                k->a8_per_As2 * core_K, -k->a9_K_per_A2s2);
-    return weaker(soc_A, weaker(core_A, surface_A));
+    return numeric_smaller(soc_A, numeric_smaller(core_A, surface_A));
 }
 
 /* What the conditions of a family leave (family_decision.c). */
@@ -91,7 +90,7 @@ static float family_limit_A(const planner_t *planner, const rcbf_constants_t *k,
                             family->disturbance_W - family->hold_W;
     const float core_A = curved_A(outflow_W, planner->start.entropic_V + family->disturbance_W_per_A,
                                 planner->start.resistance_ohm + family->disturbance_W_per_A2);
-    return weaker(core_A,
+    return numeric_smaller(core_A,
                   family_mapped_A(&family->map,
                                   k->max_core_temperature_K.high_K + above_K[SURFACE],
                                   planner->soc));
@@ -107,7 +106,7 @@ static float next_strength_A(const planner_t *planner, const planner_constants_t
     const float limit_A = (family->is_stated != 0u) ? family_limit_A(planner, cell, family)
                                                     : cell_limit_A(planner, cell, constants->step_s);
     const float allowed_A =
-        weaker(weaker(limit_A, voltage_A), planner->strength_A + constants->growth_A);
+        numeric_smaller(numeric_smaller(limit_A, voltage_A), planner->strength_A + constants->growth_A);
     return numeric_clamp(allowed_A, 0.0f, planner->inner[planner->trying].strength_A);
 }
 
@@ -144,7 +143,7 @@ static void begin_prediction(planner_t *planner, uint8_t which)
     planner->strength_A = planner->start.strength_A;
     planner->elapsed_s = 0.0f;
     planner->trying = which;
-    planner->inner[which].strength_A = weaker(strength_A, planner->goal.strongest_A);
+    planner->inner[which].strength_A = numeric_smaller(strength_A, planner->goal.strongest_A);
 }
 
 /* A sum is finite only where all parts are. */

@@ -1,6 +1,7 @@
 #include "rcbf.h"
 
 #include <math.h>
+#include <stddef.h>
 
 #include "numeric.h"
 
@@ -19,6 +20,11 @@
 #define LEAST_CONSTANT 1e-12f
 /* Share of its terms that a function has to be above 0, for its roots to be left alone. */
 #define CLEARLY 1e-5f
+
+/* Of the way to the present reading that a steadied condition goes in a period, and what it keeps
+ * below it on average, as a share of the margin; that much noise does not move it at once. */
+#define STEADY_SHARE 0.2f
+#define STEADY_RESERVE 0.25f
 
 /* constant + linear u >= 0 with linear > 0 */
 typedef struct {
@@ -53,10 +59,10 @@ static float difference_K(rcbf_temperature_t a, rcbf_temperature_t b)
     return (a.high_K - b.high_K) + (a.low_K - b.low_K);
 }
 
-NUMERIC_INLINE line_t voltage_left(const rcbf_constants_t *k, const rcbf_input_t *in)
+NUMERIC_INLINE line_t voltage_left(const rcbf_constants_t *k, float open_circuit_voltage_V)
 {
     return (line_t){
-        k->max_voltage_V - rcbf_open_circuit_voltage_V(k, in->soc) - k->voltage_margin_V,
+        k->max_voltage_V - open_circuit_voltage_V - k->voltage_margin_V,
         k->ohmic_resistance_ohm,
     };
 }
@@ -122,14 +128,18 @@ NUMERIC_INLINE float value_at(concave_t f, float u)
     return f.constant + u * (f.linear + u * f.quadratic);
 }
 
-NUMERIC_INLINE float smaller(float a, float b)
-{
-    return (a < b) ? a : b;
-}
-
 NUMERIC_INLINE float least_value_at(const robust_t *f, float u)
 {
-    return smaller(value_at(less_error(f), u), value_at(plus_error(f), u));
+    return numeric_smaller(value_at(less_error(f), u), value_at(plus_error(f), u));
+}
+
+/* An end that is no number leaves nothing, and stays: no later end lies beyond it. */
+NUMERIC_INLINE void raise_lower(interval_t *to, float lower_A, rcbf_active_t name)
+{
+    if (!(lower_A <= to->lower_A)) {
+        to->lower_A = (lower_A <= FLT_MAX) ? lower_A : FLT_MAX;
+        to->active = name;
+    }
 }
 
 /* Takes what a function does not admit from an interval. */
@@ -147,23 +157,16 @@ static void narrow(interval_t *to, concave_t f, rcbf_active_t name)
         lower_A = (first < second) ? first : second;
         upper_A = (first < second) ? second : first;
     }
-    if (lower_A > to->lower_A) {
-        to->lower_A = lower_A;
-        to->active = name;
-    }
-    if (upper_A < to->upper_A) {
-        to->upper_A = upper_A;
+    raise_lower(to, lower_A, name);
+    if (!(upper_A >= to->upper_A)) {
+        to->upper_A = (upper_A >= -FLT_MAX) ? upper_A : -FLT_MAX;
     }
 }
 
 /* The end of what a line that rises with u admits. */
 NUMERIC_INLINE void narrow_by_line(interval_t *to, line_t f, rcbf_active_t name)
 {
-    const float lower_A = -f.constant / f.linear;
-    if (lower_A > to->lower_A) {
-        to->lower_A = lower_A;
-        to->active = name;
-    }
+    raise_lower(to, -f.constant / f.linear, name);
 }
 
 /* Narrows by both functions of a constraint with an error term, but for those that leave all.
@@ -179,7 +182,7 @@ NUMERIC_INLINE void narrow_by_line(interval_t *to, line_t f, rcbf_active_t name)
 NUMERIC_INLINE void narrow_by_both(interval_t *to, const robust_t *f, rcbf_active_t name)
 {
     const float quadratic = f->mean.quadratic;
-    const float u = smaller(to->lower_A, 0.0f);
+    const float u = numeric_smaller(to->lower_A, 0.0f);
     const bool is_above = f->rest + u * f->slope < 0.0f;
     const float rest = is_above ? -f->rest : f->rest;
     const float slope = is_above ? -f->slope : f->slope;
@@ -191,32 +194,22 @@ NUMERIC_INLINE void narrow_by_both(interval_t *to, const robust_t *f, rcbf_activ
     }
     narrow(to, lower, name);
     const concave_t upper = { f->mean.constant + rest, f->mean.linear + slope, quadratic };
-    if (!(is_open && (value_at(upper, smaller(to->lower_A, 0.0f)) > enough))) {
+    if (!(is_open && (value_at(upper, numeric_smaller(to->lower_A, 0.0f)) > enough))) {
         narrow(to, upper, name);
     }
-}
-
-/* Numbers from 0 up compare as their bits do, and NaN comes after all of them. */
-NUMERIC_INLINE uint32_t bits_of(float value)
-{
-    const union {
-        float value;
-        uint32_t bits;
-    } both = { value };
-    return both.bits;
 }
 
 /* Whether the magnitude is, for a largest one from 0 up; the sign is shifted out. */
 NUMERIC_INLINE bool is_no_larger(float value, float largest)
 {
-    return (bits_of(value) << 1u) <= (bits_of(largest) << 1u);
+    return (numeric_bits(value) << 1u) <= (numeric_bits(largest) << 1u);
 }
 
 /* The low part is what float32 cannot hold of the sum, no more. */
 NUMERIC_INLINE bool is_temperature(rcbf_temperature_t temperature)
 {
-    return (bits_of(temperature.high_K) - bits_of(COLDEST_K) <=
-            bits_of(HOTTEST_K) - bits_of(COLDEST_K)) &&
+    return (numeric_bits(temperature.high_K) - numeric_bits(COLDEST_K) <=
+            numeric_bits(HOTTEST_K) - numeric_bits(COLDEST_K)) &&
            is_no_larger(temperature.low_K, LARGEST_LOW_PART_K);
 }
 
@@ -229,14 +222,41 @@ NUMERIC_INLINE bool is_physical(const rcbf_input_t *in)
            (in->reference_current_A <= 0.0f);
 }
 
+void rcbf_steadier_reset(rcbf_steadier_t *steadier)
+{
+    *steadier = (rcbf_steadier_t){ FLT_MAX, FLT_MAX };
+}
+
+/* What a condition leaves at 0 A, steadied: never more than the reading says, so that only current
+ * is lost by it. What is no number gives way to the reading. */
+static void steady(float *kept, concave_t *f, float margin)
+{
+    *kept += STEADY_SHARE * (f->constant - STEADY_RESERVE * margin - *kept);
+    if (!(*kept <= f->constant)) {
+        *kept = f->constant;
+    }
+    f->constant = *kept;
+}
+
 rcbf_decision_t rcbf_solve(const rcbf_constants_t *constants, const rcbf_input_t *input)
+{
+    rcbf_steadier_t none;
+    rcbf_steadier_reset(&none);
+    return rcbf_solve_steadily(constants, input,
+                               rcbf_open_circuit_voltage_V(constants, input->soc), &none);
+}
+
+rcbf_decision_t rcbf_solve_steadily(const rcbf_constants_t *constants, const rcbf_input_t *input,
+                                    float open_circuit_voltage_V, rcbf_steadier_t *steadier)
 {
     if (!is_physical(input)) {
         return (rcbf_decision_t){ .active = RCBF_INVALID };
     }
-    const line_t voltage = voltage_left(constants, input);
+    const line_t voltage = voltage_left(constants, open_circuit_voltage_V);
     const line_t soc = soc_left(constants, input);
-    const robust_t robust[2] = { core_left(constants, input), surface_left(constants, input) };
+    robust_t robust[2] = { core_left(constants, input), surface_left(constants, input) };
+    steady(&steadier->core_K_per_s, &robust[0].mean, constants->core_margin_K_per_s);
+    steady(&steadier->surface_K_per_s2, &robust[1].mean, constants->surface_margin_K_per_s2);
     interval_t interval = { input->reference_current_A, 0.0f, RCBF_NONE };
     narrow_by_line(&interval, voltage, RCBF_VOLTAGE);
     narrow_by_line(&interval, soc, RCBF_SOC);
@@ -289,33 +309,28 @@ float rcbf_open_circuit_voltage_near_V(const rcbf_constants_t *constants, float 
     return ocv_V(constants, *segment, clamped);
 }
 
+#define AT(member) ((uint16_t)offsetof(rcbf_constants_t, member))
+
 bool rcbf_constants_are_valid(const rcbf_constants_t *k)
 {
-    const float positive[] = { k->capacity_As,
-                               k->ohmic_resistance_ohm,
-                               k->max_voltage_V,
-                               k->max_soc,
-                               k->alpha1_per_s,
-                               k->alpha2_per_s,
-                               k->alpha3_per_s2,
-                               k->a1_per_s,
-                               k->a3_K_per_A2s,
-                               -k->a9_K_per_A2s2,
-                               k->a10_K_per_Ws2 };
-    const float not_negative[] = { k->delta4_K_per_s2,          k->soc_uncertainty_per_s,
-                                   k->core_uncertainty_K_per_s, k->estimation_error_bound_K,
-                                   k->voltage_margin_V,         k->soc_margin_per_s,
-                                   k->core_margin_K_per_s,      k->surface_margin_K_per_s2 };
-    bool valid = numeric_is_finite(k->a2_per_As) && numeric_is_finite(k->a8_per_As2) &&
-                 numeric_is_finite(k->a4_per_s2) && numeric_is_finite(k->a6_per_s2) &&
-                 is_temperature(k->max_core_temperature_K) &&
-                 is_temperature(k->max_surface_temperature_K);
-    for (uint32_t i = 0u; i < sizeof positive / sizeof positive[0]; i++) {
-        valid = valid && (positive[i] >= LEAST_POSITIVE) && (positive[i] <= FLT_MAX);
-    }
-    for (uint32_t i = 0u; i < sizeof not_negative / sizeof not_negative[0]; i++) {
-        valid = valid && (not_negative[i] >= 0.0f) && (not_negative[i] <= FLT_MAX);
-    }
-    return valid && (k->ocv_points >= 2u) && (k->ocv_points <= RCBF_MAX_OCV_POINTS) &&
+    static const uint16_t POSITIVE[] = {
+        AT(capacity_As),  AT(ohmic_resistance_ohm), AT(max_voltage_V), AT(max_soc),
+        AT(alpha1_per_s), AT(alpha2_per_s),         AT(alpha3_per_s2), AT(a1_per_s),
+        AT(a3_K_per_A2s), AT(a10_K_per_Ws2),
+    };
+    static const uint16_t NOT_NEGATIVE[] = {
+        AT(delta4_K_per_s2),          AT(soc_uncertainty_per_s),    AT(core_uncertainty_K_per_s),
+        AT(estimation_error_bound_K), AT(voltage_margin_V),         AT(soc_margin_per_s),
+        AT(core_margin_K_per_s),      AT(surface_margin_K_per_s2),
+    };
+    static const uint16_t ANY[] = { AT(a2_per_As), AT(a8_per_As2), AT(a4_per_s2), AT(a6_per_s2) };
+    return is_temperature(k->max_core_temperature_K) &&
+           is_temperature(k->max_surface_temperature_K) &&
+           numeric_members_are_within(k, POSITIVE, NUMERIC_COUNT(POSITIVE), LEAST_POSITIVE,
+                                      FLT_MAX) &&
+           numeric_members_are_within(k, NOT_NEGATIVE, NUMERIC_COUNT(NOT_NEGATIVE), 0.0f,
+                                      FLT_MAX) &&
+           numeric_members_are_within(k, ANY, NUMERIC_COUNT(ANY), -FLT_MAX, FLT_MAX) &&
+           numeric_is_within(k->a9_K_per_A2s2, -FLT_MAX, -LEAST_POSITIVE) && (k->ocv_points >= 2u) && (k->ocv_points <= RCBF_MAX_OCV_POINTS) &&
            numeric_rises(k->ocv_soc, k->ocv_points) && numeric_rises(k->ocv_V, k->ocv_points);
 }

@@ -4,25 +4,39 @@ from __future__ import annotations
 
 import logging
 import shlex
-import socket
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import can
-from can.interfaces.socketcan import SocketcanBus
 
 from bms.errors import BusError, InputError
+from hil_sim.bus.batches import BatchBus, SocketcanBatchBus, VirtualBatchBus, heard_of
 from hil_sim.bus.closing import Closing
 from hil_sim.bus.deadline import Deadline
-from hil_sim.bus.foreign import ForeignFrame, foreign_kind, is_unreadable
+from hil_sim.bus.foreign import ForeignFrame, is_unreadable
+from hil_sim.bus.frame import Frame
 from hil_sim.bus.slcan import SCHEME, SlcanSocketBus
+
+__all__ = [
+    "GUEST",
+    "CanBus",
+    "Frame",
+    "ecu_remedy",
+    "heard_on",
+    "is_serial_line",
+    "next_heard",
+    "one_line",
+    "open_bus",
+    "open_interface",
+    "require_room_for_ecu",
+    "require_shared",
+]
 
 GUEST = Path(__file__).with_name("vcan_guest.sh")
 """Runs a command where vcan0 exists, also on a kernel without CAN."""
-RECEIVE_BUFFER_BYTES = 1 << 20
 _STANDARD_FRAMES = [{"can_id": 0, "can_mask": 0, "extended": False}]
 _MOST_LATE_FOREIGN = 1000
 """Foreign frames that are skipped after the deadline, for what came before it and waits behind."""
@@ -37,24 +51,13 @@ _QUIRKS: dict[str, dict[str, Any]] = {
 # foreign frame for the end of a wait of 0 s.
 _NODE_OPTIONS: dict[str, dict[str, Any]] = {"socketcan": {"can_filters": _STANDARD_FRAMES}}
 
+_BATCH_BUSES: dict[str, Callable[..., can.BusABC]] = {
+    "virtual": VirtualBatchBus,
+    "socketcan": SocketcanBatchBus,
+}
+
 # What an adapter has to say when it cannot be opened is in the exception already.
 logging.getLogger("can").addHandler(logging.NullHandler())
-
-
-class Frame(NamedTuple):
-    """A data frame with an 11-bit identifier."""
-
-    frame_id: int
-    data: bytes
-
-
-class _Message(can.Message):
-    """A message that nobody changes, so that the virtual bus needs no copy for every receiver."""
-
-    __slots__ = ()
-
-    def __deepcopy__(self, memo: dict[int, Any] | None) -> can.Message:
-        return self
 
 
 class CanBus(Closing):
@@ -65,15 +68,22 @@ class CanBus(Closing):
     ) -> None:
         self.name = name
         self._bus = bus
+        self._batches = bus if isinstance(bus, BatchBus) else None
         self._clock_s = clock_s
+        self._waiting = deque[Frame]()
         self.foreign = Counter[ForeignFrame]()
         """What came of other kinds, as far as the interface hands it over."""
 
-    def send(self, frame: Frame) -> None:
-        """Put a frame on the bus; BusError when the bus does not take it."""
-        message = _Message(arbitration_id=frame.frame_id, data=frame.data, is_extended_id=False)
+    def send(self, *frames: Frame) -> None:
+        """Put frames on the bus in order; BusError when the bus does not take them."""
         try:
-            self._bus.send(message)
+            if self._batches is not None:
+                self._batches.send_frames(frames)
+                return
+            for frame_id, data in frames:
+                self._bus.send(
+                    can.Message(arbitration_id=frame_id, data=data, is_extended_id=False)
+                )
         except (can.CanError, OSError) as error:
             raise BusError(f"bus '{self.name}': cannot send: {one_line(error)}") from None
 
@@ -82,20 +92,66 @@ class CanBus(Closing):
 
         Foreign frames do not prolong the wait.
         """
+        waiting = self._waiting
+        if waiting:
+            return waiting.popleft()
         deadline = Deadline(timeout_s, self._clock_s)
         late = 0
         while late < _MOST_LATE_FOREIGN:
             left_s = deadline.left_s
-            heard = next_heard(self.name, self._bus, left_s)
-            if not isinstance(heard, ForeignFrame):
-                return heard
-            self.foreign[heard] += 1
-            late += left_s == 0.0
+            heard = self._hear(left_s)
+            if not heard:
+                return None
+            for one in heard:
+                if isinstance(one, ForeignFrame):
+                    self.foreign[one] += 1
+                    late += left_s == 0.0
+                else:
+                    waiting.append(one)
+            if waiting:
+                return waiting.popleft()
         return None
+
+    def gather(
+        self, last_id: int, is_last: Callable[[Frame], bool], timeout_s: float, most: int
+    ) -> list[Frame]:
+        """Frames up to one of last_id that `is_last`, or what has come within timeout_s.
+
+        Never more than `most`, so that a stream of others ends the wait.
+        """
+        frames, waiting = list[Frame](), self._waiting
+        deadline = Deadline(timeout_s, self._clock_s)
+        while len(frames) < most:
+            frame = waiting.popleft() if waiting else self.receive(deadline.left_s)
+            if frame is None:
+                break
+            frames.append(frame)
+            if frame[0] == last_id and is_last(frame):
+                break
+        return frames
+
+    def _hear(self, timeout_s: float) -> list[Frame | ForeignFrame]:
+        return heard_on(self.name, self._bus, self._batches, timeout_s)
 
     def close(self) -> None:
         """Close the connection to the bus."""
         self._bus.shutdown()
+
+
+def heard_on(
+    name: str, bus: can.BusABC, batches: BatchBus | None, timeout_s: float
+) -> list[Frame | ForeignFrame]:
+    """What has come from a bus, after a wait of up to timeout_s for the first; empty without any.
+
+    All of it where the bus is one of batches, else one at a time. BusError when the bus fails.
+    """
+    if batches is None:
+        heard = next_heard(name, bus, timeout_s)
+        return [] if heard is None else [heard]
+    try:
+        return batches.hear(timeout_s)
+    except (can.CanError, OSError) as error:
+        raise BusError(f"bus '{name}': cannot receive: {one_line(error)}") from None
 
 
 def next_heard(name: str, bus: can.BusABC, timeout_s: float) -> Frame | ForeignFrame | None:
@@ -109,9 +165,7 @@ def next_heard(name: str, bus: can.BusABC, timeout_s: float) -> Frame | ForeignF
         if is_unreadable(error):
             return ForeignFrame.UNREADABLE
         raise BusError(f"bus '{name}': cannot receive: {one_line(error)}") from None
-    if message is None:
-        return None
-    return foreign_kind(message) or Frame(message.arbitration_id, bytes(message.data))
+    return None if message is None else heard_of(message)
 
 
 def open_bus(name: str) -> CanBus:
@@ -131,7 +185,9 @@ def open_interface(name: str, **options: Any) -> can.BusABC:
     try:
         if interface == "slcan" and channel.startswith(SCHEME):
             return SlcanSocketBus(channel, **options)
-        bus = can.Bus(
+        if interface in _BATCH_BUSES:
+            return _BATCH_BUSES[interface](channel, **options)
+        return can.Bus(
             interface=interface,
             channel=channel,
             ignore_config=True,
@@ -141,9 +197,6 @@ def open_interface(name: str, **options: Any) -> can.BusABC:
         raise BusError(
             f"bus '{name}': cannot be opened ({one_line(error)}); {_remedy(interface)}"
         ) from None
-    if isinstance(bus, SocketcanBus):
-        bus.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
-    return bus
 
 
 def require_shared(name: str) -> None:

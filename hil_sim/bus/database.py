@@ -21,23 +21,34 @@ Values = dict[str, "float | None"]
 
 
 @dataclass(frozen=True)
-class _Signal:
-    """Scaling of a signal, with its offset and range in steps; so 0 and what is read are exact."""
+class Signal:
+    """Place and scaling of a signal, the offset and range in steps; so what is read is exact.
+
+    An unsigned little-endian field of `length` bits from bit `start` on.
+    """
 
     name: str
+    start: int
+    length: int
     scale: float
     offset_steps: int
     lowest: int
     highest: int
-    all_ones: int
+
+    @property
+    def all_ones(self) -> int:
+        """What is sent for a value that is not available."""
+        return (1 << self.length) - 1
 
     def raw(self, value: float | None) -> int:
+        """Raw value of a physical one, within the range."""
         if value is None or math.isnan(value):
             return self.all_ones
         steps = value / self.scale - self.offset_steps
         return round(min(max(steps, self.lowest), self.highest))
 
     def physical(self, raw: int) -> float | None:
+        """Physical value of a raw one; None outside of the range."""
         if not self.lowest <= raw <= self.highest:
             return None
         return (raw + self.offset_steps) * self.scale
@@ -54,17 +65,19 @@ class MessageCodec:
         self._counter = f"{message.name}Counter"
         self._crc = f"{message.name}Crc"
         self.data_ids = can_database.data_ids(message)
-        self._signals = [_signal(s) for s in message.signals]
-        self._payload = [s for s in self._signals if s.name not in (self._counter, self._crc)]
+        self.signals = [
+            _signal(s) for s in message.signals if s.name not in (self._counter, self._crc)
+        ]
+        """All signals apart from CRC and counter."""
 
     @property
     def signal_names(self) -> list[str]:
         """Names of the signals apart from CRC and counter."""
-        return [signal.name for signal in self._payload]
+        return [signal.name for signal in self.signals]
 
     def encode(self, values: Mapping[str, float | None], counter: int = 0) -> bytes:
         """Payload with these values in the database's units; a signal left out is not available."""
-        raw = {signal.name: signal.raw(values.get(signal.name)) for signal in self._payload}
+        raw = {signal.name: signal.raw(values.get(signal.name)) for signal in self.signals}
         if not self.data_ids:
             return bytes(self._message.encode(raw, scaling=False, strict=False))
         raw[self._counter], raw[self._crc] = counter, 0
@@ -86,7 +99,7 @@ class MessageCodec:
         if not self.is_intact(data):
             return None
         raw = self._message.decode(data, decode_choices=False, scaling=False)
-        return {signal.name: signal.physical(raw[signal.name]) for signal in self._payload}
+        return {signal.name: signal.physical(raw[signal.name]) for signal in self.signals}
 
     @staticmethod
     def counter(data: bytes) -> int:
@@ -128,12 +141,14 @@ def _crc_of_byte(byte: int) -> int:
 _CRC_TABLE = bytes(map(_crc_of_byte, range(256)))
 
 
-def _signal(signal: Any) -> _Signal:
-    return _Signal(
+def _signal(signal: Any) -> Signal:
+    assert signal.byte_order == "little_endian" and not signal.is_signed, signal.name
+    return Signal(
         name=signal.name,
+        start=signal.start,
+        length=signal.length,
         scale=signal.scale,
         offset_steps=round(signal.offset / signal.scale),
         lowest=round((signal.minimum - signal.offset) / signal.scale),
         highest=round((signal.maximum - signal.offset) / signal.scale),
-        all_ones=(1 << signal.length) - 1,
     )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from hil_sim.bus.catalog import FaultPage, FirstFault
-from hil_sim.bus.database import Values
 
 FIRST_FAULTS = 20
 """Faults in Diagnostics; the later ones are in Diagnostics2."""
@@ -21,19 +22,19 @@ class FaultBits:
         self.latched: int | None = None
         self._more = dict.fromkeys(FaultPage, 0)
 
-    def take(self, values: Values) -> None:
-        """Take the values of one message or of several, by signal."""
-        more = values.get("MoreFaults")
-        for page in FaultPage:
-            if more is not None and values.get("FaultPage") == page:
+    def take(self, value: Callable[[str], float | None]) -> None:
+        """Take what messages say, from a function that gives the value of a signal."""
+        more = value("MoreFaults")
+        for page in FaultPage if more is not None else ():
+            if more is not None and value("FaultPage") == page:
                 self._more[page] = int(more) << FIRST_FAULTS
-        first = values.get("FirstFault")
+        first = value("FirstFault")
         if first == FirstFault.NONE:
             self._more[FaultPage.LATCHED] = 0
         elif first is not None and first >= FIRST_FAULTS:
             self._more[FaultPage.LATCHED] |= 1 << int(first)
-        self.active = self._joined(values.get("ActiveFaults"), self.active, FaultPage.ACTIVE)
-        self.latched = self._joined(values.get("LatchedFaults"), self.latched, FaultPage.LATCHED)
+        self.active = self._joined(value("ActiveFaults"), self.active, FaultPage.ACTIVE)
+        self.latched = self._joined(value("LatchedFaults"), self.latched, FaultPage.LATCHED)
 
     def _joined(self, told: float | None, known: int | None, page: FaultPage) -> int | None:
         if told is None and known is None:

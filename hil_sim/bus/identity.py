@@ -22,6 +22,8 @@ class Identity:
     def of(cls, value: Callable[[str], float | None]) -> Identity | None:
         """From a function that gives the value of a signal; None before the message has come."""
         signals = ("ModelHash", "PresetHash", "FirmwareVersion", "NetworkVersion")
+        if value(signals[0]) is None:
+            return None
         model, preset, firmware, network = map(value, signals)
         if model is None or preset is None or firmware is None or network is None:
             return None

@@ -56,7 +56,7 @@ def bench(
     jobs: options.JobsOption = DEFAULT_PROCESSES,
     as_json: JsonOption = False,
 ) -> int:
-    """Time estimate, decision, control period, simulation and campaign in one run.
+    """Time estimate, decision, control period, simulation and campaign, and count on the boards.
 
     All ways to an answer are given the states of the same simulated charge, and their answers are
     compared before they are timed; exit code 1 when they differ. Medians of repetitions with

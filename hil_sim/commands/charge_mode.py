@@ -26,7 +26,7 @@ ModeOption = Annotated[
     typer.Option(
         "--mode",
         help="What the charger asks for beside the reference current: to follow it, the fastest "
-        "charge, or one that is full by --full-by-s. Default: nothing, which is fixed.",
+        "charge, or one that is full by --full-by-s. Default: nothing, which is the fastest.",
     ),
 ]
 FullByOption = Annotated[

@@ -14,6 +14,7 @@ from rich.text import Text
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands.options import DEFAULT_PROCESSES, JsonOption, out_folder_option
 from bms.presets import Preset, load_preset
+from bms.presets.paper_form import in_paper_form
 from bms.text_table import TextTable, red
 from bms.waiting import waiting
 from hil_sim.commands import options
@@ -33,7 +34,7 @@ def reproduce(
     jobs: options.JobsOption = DEFAULT_PROCESSES,
     max_time_s: options.MaxTimeOption = 3600.0,
 ) -> int:
-    """Run the paper's comparison on both presets and show its figures beside ours.
+    """Run the paper's comparison on both presets, with its gains, and show its figures beside ours.
 
     Every controller charges under every disturbance; then the firmware charges without one of its
     margins at a time, which shows what that margin costs. Peaks in K, times in s from the start of
@@ -41,7 +42,7 @@ def reproduce(
 
     Example: bms reproduce --out out/reproduce
     """
-    cases, presets = all_cases(), [load_preset(name) for name in PRESETS]
+    cases, presets = all_cases(), [in_paper_form(load_preset(name)) for name in PRESETS]
     with OutputFolder(out) if out is not None else nullcontext() as folder:
         with waiting("charging", len(cases), "charges") as wait:
             results = run_cases(cases, seed, jobs, max_time_s, wait.advance)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from bms.model.model_file import KanModel
 from bms.presets import Preset
+from hil_sim.bus.catalog import Mode
 from hil_sim.fault_matrix.matrix import Row
 from hil_sim.fault_matrix.verdict import Verdict, judge
 from hil_sim.run.session import run_both, run_on_clocks
@@ -48,6 +49,8 @@ def run_settings(settings: MatrixSettings, row: Row) -> Settings:
         preset=settings.preset,
         initial=row.start.initial(settings.preset),
         model=settings.model,
+        # Rows need a current that is limited by what they disturb, which a plan rarely is.
+        mode=Mode.FIXED,
         bus=settings.bus,
         seed=settings.seed,
         max_time_s=periods * settings.preset.timing.sampling_period_s,

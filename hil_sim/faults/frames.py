@@ -249,6 +249,42 @@ class Masquerade(MessageFault):
 
 @strict
 @dataclass(frozen=True, kw_only=True)
+class MessageContested(MessageFault):
+    """Somebody else sends the message as well, with one signal changed and all else right.
+
+    Its counter runs: with the true frame's where it comes ahead of it, one further where behind.
+    """
+
+    kind: Literal["message-contested"]
+    signal: str
+    value: float
+    position: Literal["ahead", "behind"] = "behind"
+
+    def check(self, database: Mapping[str, MessageCodec]) -> None:
+        """Raise InputError for a message without a counter, and for a signal that it has not."""
+        codec = database[self.message]
+        if not codec.data_ids:
+            raise InputError(f"message: {self.message} is not protected; give one that is")
+        if self.signal not in codec.signal_names:
+            raise InputError(
+                f"signal: {self.message} has no signal {self.signal!r}; give one of "
+                f"{', '.join(codec.signal_names)}"
+            )
+
+    def change(self, frame: Frame, active: bool, memory: FrameMemory) -> list[Frame]:
+        """The frame and, ahead of it or behind, that of somebody else."""
+        codec = memory.database[self.message]
+        values = codec.decode(frame.data) if active else None
+        if values is None:
+            return [frame]
+        steps = 1 if self.position == "behind" else 0
+        counter = (codec.counter(frame.data) + steps) % COUNTER_MODULUS
+        other = frame._replace(data=codec.encode({**values, self.signal: self.value}, counter))
+        return [frame, other] if self.position == "behind" else [other, frame]
+
+
+@strict
+@dataclass(frozen=True, kw_only=True)
 class BusOff(FrameFault):
     """No frame passes, in either direction."""
 
@@ -317,6 +353,7 @@ FRAME_FAULTS = (
     WrongId,
     WrongLength,
     Masquerade,
+    MessageContested,
     BusOff,
     Flood,
 )

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 import shlex
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, islice
 from pathlib import Path
 
 from bms.errors import InputError
@@ -34,6 +34,9 @@ _PARSERS: Mapping[str, type[LineParser]] = {
     ".trc": TrcParser,
 }
 _READERS = {".blf": blf_entries, ".mf4": mdf4_entries}
+MOST_ENTRIES = 2_000_000
+"""Five hours of a charge; a compressed log of few bytes can hold many times more."""
+
 _HIGHEST_TIME_S = 1e11
 _MICROSECONDS = 6
 
@@ -107,8 +110,17 @@ def _entries(path: Path, form: LogFormat) -> tuple[_Located, bool]:
         raise InputError(f"{path}: not a file; give the path of a log")
     if form.suffix in _PARSERS:
         parser = _PARSERS[form.suffix]()
-        return list(text_entries(path, parser)), parser.delta_times
-    return list(_READERS[form.suffix](path)), False
+        return _limited(path, text_entries(path, parser)), parser.delta_times
+    return _limited(path, _READERS[form.suffix](path)), False
+
+
+def _limited(path: Path, entries: Iterable[tuple[int, Entry]]) -> _Located:
+    located = list(islice(entries, MOST_ENTRIES + 1))
+    if len(located) > MOST_ENTRIES:
+        raise InputError(
+            f"{path}: more than {MOST_ENTRIES} entries are in it; split it, and read the parts"
+        )
+    return located
 
 
 def _added_up(located: _Located) -> _Located:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
 from hil_sim.bus.buses import Frame
 from hil_sim.bus.catalog import FrameId
 from hil_sim.bus.closing import Closing
-from hil_sim.logs import LogFrame, LogWriter
+from hil_sim.logs import LogWriter
 
 
 class Recorder(Closing):
@@ -23,11 +24,10 @@ class Recorder(Closing):
             self._writers = [stack.enter_context(LogWriter(path)) for path in paths]
             self._open = stack.pop_all()
 
-    def record(self, time_s: float, frame: Frame, received: bool) -> None:
-        """Append one frame at a time in s since the start of the run."""
-        entry = LogFrame(time_s, frame.frame_id, frame.data, received=received)
+    def record(self, time_s: float, frames: Sequence[Frame], received: bool) -> None:
+        """Append frames of one time in s since the start of the run."""
         for writer in self._writers:
-            writer.write(entry)
+            writer.write_all(time_s, frames, received)
 
     def close(self) -> None:
         """Complete the files."""
@@ -42,10 +42,11 @@ class PeriodRecorder(Recorder):
         self.periods: list[list[Frame]] = []
         self._sent: list[Frame] = []
 
-    def record(self, time_s: float, frame: Frame, received: bool) -> None:
-        """Keep one frame; SYNC ends the period."""
-        if not received and frame.frame_id == FrameId.SYNC:
-            self.periods.append(self._sent)
-            self._sent = []
-        elif not received:
-            self._sent.append(frame)
+    def record(self, time_s: float, frames: Sequence[Frame], received: bool) -> None:
+        """Keep what is sent; SYNC ends the period."""
+        for frame in () if received else frames:
+            if frame.frame_id == FrameId.SYNC:
+                self.periods.append(self._sent)
+                self._sent = []
+            else:
+                self._sent.append(frame)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+from collections.abc import Iterable
 from contextlib import ExitStack
 from io import TextIOWrapper
 from pathlib import Path
@@ -18,6 +19,35 @@ from hil_sim.logs.frame import LogFrame
 CHANNEL = "vcan0"
 """Name in a candump log whatever the bus was, so that equal runs give equal logs and canplayer
 plays."""
+
+
+class _CandumpLines:
+    """What python-can's writer makes of data frames, without a message for each line.
+
+    A frame that is older than the first one gets the time of that.
+    """
+
+    def __init__(self, file: Any) -> None:
+        self._write = file.write
+        self._first_s: float | None = None
+
+    def write(
+        self,
+        time_s: float,
+        frames: Iterable[tuple[int, bytes]],
+        received: bool,
+        is_extended: bool = False,
+    ) -> None:
+        time_s = round(time_s, 6)
+        if self._first_s is None:
+            self._first_s = time_s or 0.0
+        time_s = max(time_s, self._first_s)
+        begin, end = f"({time_s:f}) {CHANNEL} ", _ENDS[received]
+        shown = "%08X#" if is_extended else "%03X#"
+        self._write("".join([begin + shown % i + data.hex().upper() + end for i, data in frames]))
+
+
+_ENDS = {True: " R\n", False: " T\n"}
 
 
 class LogWriter(Closing):
@@ -37,11 +67,15 @@ class LogWriter(Closing):
                 file = stack.enter_context(gzip.GzipFile("", "wb", fileobj=file, mtime=0))
             if form.is_text:
                 file = stack.enter_context(TextIOWrapper(file, encoding="utf-8"))
+            self._lines = _CandumpLines(file) if form.suffix == ".log" else None
             self._writer = MESSAGE_WRITERS[form.suffix](file, **options)
             self._files = stack.pop_all()
 
     def write(self, frame: LogFrame) -> None:
         """Append a frame."""
+        if self._lines is not None:
+            self._lines.write(frame.time_s, [frame[1:3]], frame.received, frame.is_extended)
+            return
         self._writer.on_message_received(
             can.Message(
                 timestamp=round(frame.time_s, 6),
@@ -51,6 +85,14 @@ class LogWriter(Closing):
                 is_rx=frame.received,
             )
         )
+
+    def write_all(self, time_s: float, frames: Iterable[tuple[int, bytes]], received: bool) -> None:
+        """Append data frames with 11-bit identifiers, all of one time and direction."""
+        if self._lines is not None:
+            self._lines.write(time_s, frames, received)
+            return
+        for frame_id, data in frames:
+            self.write(LogFrame(time_s, frame_id, data, received=received))
 
     def close(self) -> None:
         """Complete the file."""

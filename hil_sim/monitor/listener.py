@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any
 
-from hil_sim.bus.buses import Frame, next_heard, open_interface
+from hil_sim.bus.batches import BatchBus
+from hil_sim.bus.buses import Frame, heard_on, open_interface
 from hil_sim.bus.closing import Closing
 from hil_sim.bus.foreign import ForeignFrame
 
@@ -20,10 +22,14 @@ class Listener(Closing):
         """Open the bus; BusError in one line when that cannot be done."""
         self.name = name
         self._bus = open_interface(name, **_OPTIONS.get(name.partition(":")[0], {}))
+        self._batches = self._bus if isinstance(self._bus, BatchBus) else None
+        self._waiting = deque[Frame | ForeignFrame]()
 
     def receive(self, timeout_s: float) -> Frame | ForeignFrame | None:
         """The next frame, or None after timeout_s; BusError when the bus fails."""
-        return next_heard(self.name, self._bus, timeout_s)
+        if not self._waiting:
+            self._waiting += heard_on(self.name, self._bus, self._batches, timeout_s)
+        return self._waiting.popleft() if self._waiting else None
 
     def close(self) -> None:
         """Close the connection to the bus."""

@@ -118,7 +118,7 @@ class SystemModel:
             self._foreign.take(time_s, frame)
             return
         values = meter.take(time_s, frame.data)
-        self._faults.take(values or {})
+        self._faults.take((values or {}).get)
         if values is not None and meter.codec.name == Message.NETWORK_DIAGNOSTICS:
             self._reports[_whole(values["ReportedMessage"])] = time_s, values
 

@@ -6,7 +6,7 @@ Imports neither the CAN database nor plotting, so that `bms ecu` starts quickly.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from hil_sim.bus.buses import CanBus, Frame
 from hil_sim.bus.catalog import FrameId
@@ -22,6 +22,12 @@ PHASE_PERIODS = 20
 _LONGEST_START_GAPS = 20
 """A bus without a gap for as long is busy with something else than a period."""
 _MOST_FRAMES_A_PERIOD = 1000
+_MOST_KEPT_FRAMES = 100
+_SYNC_ID = int(FrameId.SYNC)
+
+
+def _any(frame: Frame) -> bool:
+    return True
 
 
 class EcuLike(Protocol):
@@ -38,12 +44,23 @@ class EcuLike(Protocol):
         ...
 
 
+@runtime_checkable
+class BatchEcu(EcuLike, Protocol):
+    """An ECU that takes a whole control period by one call."""
+
+    def exchange(self, frames: Sequence[tuple[int, bytes]]) -> Sequence[tuple[int, bytes]]:
+        """Receive frames, step, and return what is transmitted."""
+        ...
+
+
 class EcuNode:
     """Connects an ECU to a bus and counts what passes."""
 
     def __init__(self, bus: CanBus, ecu: EcuLike) -> None:
         self._bus = bus
         self._ecu = ecu
+        self._batches = ecu if isinstance(ecu, BatchEcu) else None
+        self._taken: list[Frame] = []
         self.frames = 0
         self.steps = 0
         self.slots: Slots | None = None
@@ -51,12 +68,13 @@ class EcuNode:
 
     def answer(self, timeout_s: float) -> bool:
         """Take in frames until a SYNC has been answered; False when timeout_s pass without."""
-        deadline = Deadline(timeout_s)
-        while (frame := self._bus.receive(deadline.left_s)) is not None:
-            if self._take(frame):
-                self._step()
-                return True
-        return False
+        frames = self._bus.gather(_SYNC_ID, _any, timeout_s, _MOST_FRAMES_A_PERIOD)
+        for frame in frames:
+            self._take(frame)
+        if not frames or frames[-1].frame_id != _SYNC_ID:
+            return False
+        self._step()
+        return True
 
     def run(self, silence_s: float, stopped: Callable[[], bool], poll_s: float = 0.1) -> None:
         """Answer every SYNC until `stopped`, or until silence_s without a frame after the first."""
@@ -108,14 +126,29 @@ class EcuNode:
 
     def _take(self, frame: Frame) -> bool:
         self.frames += 1
-        self._ecu.receive(frame.frame_id, frame.data)
-        return frame.frame_id == FrameId.SYNC
+        if self._batches is None:
+            self._ecu.receive(frame.frame_id, frame.data)
+        else:
+            self._taken.append(frame)
+            if len(self._taken) >= _MOST_KEPT_FRAMES:
+                self._hand_on(self._batches)
+        return frame.frame_id == _SYNC_ID
+
+    def _hand_on(self, ecu: EcuLike) -> None:
+        """Frames of a stream without SYNC must not pile up."""
+        for kept in self._taken:
+            ecu.receive(kept.frame_id, kept.data)
+        self._taken.clear()
 
     def _step(self) -> None:
-        self._ecu.step()
+        if self._batches is None:
+            self._ecu.step()
+            answers = self._ecu.transmit()
+        else:
+            answers = self._batches.exchange(self._taken)
+            self._taken.clear()
         self.steps += 1
-        for frame_id, data in self._ecu.transmit():
-            self._bus.send(Frame(frame_id, data))
+        self._bus.send(*[Frame(*answer) for answer in answers])
 
     def _heard_measurement(self, poll_s: float, stopped: Callable[[], bool]) -> bool:
         while not stopped():

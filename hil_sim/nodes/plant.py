@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
+from operator import itemgetter
+from typing import NamedTuple
 
 from bms.errors import BusError
-from bms.firmware import Reception, ReceptionCounts
+from bms.firmware import ReceptionCounts
 from hil_sim.bus import catalog
 from hil_sim.bus.buses import CanBus, Frame, ecu_remedy, is_serial_line
 from hil_sim.bus.catalog import Message
-from hil_sim.bus.database import COUNTER_MODULUS, MessageCodec, Values
-from hil_sim.bus.e2e import Receiver, Sender
+from hil_sim.bus.database import COUNTER_MODULUS, MessageCodec
 from hil_sim.bus.fault_bits import FaultBits
 from hil_sim.bus.identity import Identity
+from hil_sim.bus.wire import Decoder, Listener, Publisher
 from hil_sim.logs.recorder import Recorder
-from hil_sim.nodes.turns import MOST_FRAMES, Turn
+from hil_sim.nodes.commands import CommandReceiver
+from hil_sim.nodes.turns import MOST_FRAMES, StampedFrame, Turn
 from hil_sim.plant.sensors import Readings
 
 CONNECT_ATTEMPTS = 10
 
+_PUBLISHED = (
+    Message.CELL_ELECTRICAL,
+    Message.CELL_THERMAL,
+    Message.COOLANT,
+    Message.CHARGE_REQUEST,
+    Message.CHARGE_MODE,
+)
+"""The last of them only where a mode is asked for."""
 _REPORTS = (
     Message.ESTIMATE,
     Message.DECISION,
@@ -36,12 +48,10 @@ _CONSTRAINTS = {constraint.value: constraint.label for constraint in catalog.Act
 
 Delivery = Callable[[list[Frame]], list[Frame]]
 """Frames that arrive in place of those that were sent."""
-StampedFrame = tuple[float, Frame]
-"""A frame with its time in s."""
+_TIME = itemgetter(0)
 
 
-@dataclass(frozen=True)
-class Request:
+class Request(NamedTuple):
     """What the charger asks for: on or off, the current wanted (A), state of charge at plug-in.
 
     Without a mode the charger leaves the message that asks for one out. The time in which to be
@@ -58,25 +68,32 @@ class Request:
 class Answer:
     """What the ECU said in one period: values by signal name, None where it said nothing."""
 
-    def __init__(self, values: Values, is_command_usable: bool, latched_faults: int | None) -> None:
-        self._values = values
-        self._is_command_usable = is_command_usable
+    def __init__(
+        self,
+        values: Sequence[float],
+        places: Mapping[str, int],
+        usable_command_A: float | None,
+        latched_faults: int | None,
+    ) -> None:
+        """Values in the order of `places`, NaN where nothing was said."""
+        self._values, self._places = values, places
+        self.usable_command_A = usable_command_A
+        """Current in A that a charger may supply; None without a command of a valid message."""
         self.latched_faults = latched_faults
         """Bit n for fault n; None where the ECU said nothing."""
 
     def value(self, signal: str) -> float | None:
         """Value of a signal in the database's unit."""
-        return self._values.get(signal)
+        place = self._places.get(signal)
+        if place is None:
+            return None
+        value = self._values[place]
+        return value if value == value else None  # noqa: PLR0124 (NaN)
 
     @property
     def command_A(self) -> float | None:
         """Commanded current in A."""
         return self.value("CommandCurrent")
-
-    @property
-    def usable_command_A(self) -> float | None:
-        """Commanded current in A that a charger may use: the message is valid, not only intact."""
-        return self.command_A if self._is_command_usable else None
 
     @property
     def state(self) -> str | None:
@@ -115,16 +132,20 @@ class PlantNode:
         self._sent, self._heard = sent, heard
         self._turn = turn
         self._recorder = recorder
-        self._electrical = Sender(database[Message.CELL_ELECTRICAL])
-        self._thermal = Sender(database[Message.CELL_THERMAL])
-        self._coolant = Sender(database[Message.COOLANT])
-        self._request = Sender(database[Message.CHARGE_REQUEST])
-        self._mode = Sender(database[Message.CHARGE_MODE])
+        self._publisher = Publisher([database[name] for name in _PUBLISHED])
         self._sync = Frame(database[Message.SYNC].frame_id, b"")
-        self._receivers = {database[name].frame_id: Receiver(database[name]) for name in _REPORTS}
+        self._listener = Listener([database[name] for name in _REPORTS])
         self._identity = database[Message.IDENTITY]
-        self._command = database[Message.CHARGE_COMMAND]
-        self._reception = Reception(self._command.frame_id)
+        command = database[Message.CHARGE_COMMAND]
+        self._command_id = command.frame_id
+        self._command = Decoder(command)
+        self._silent_command = [math.nan] * len(command.signals)
+        self._places = dict(self._listener.places)
+        for signal in command.signals:
+            self._places[signal.name] = len(self._places)
+        self._checked: Frame | None = None
+        self._checked_counter: int | None = None
+        self._commands = CommandReceiver(command)
         self._faults = FaultBits()
         self._foreign_version: str | None = None
         self._last_counter: int | None = None
@@ -134,7 +155,7 @@ class PlantNode:
     @property
     def command_counts(self) -> ReceptionCounts:
         """Charge commands that were not as they should be."""
-        return self._reception.counts
+        return self._commands.counts
 
     def wait(self) -> None:
         """Return when the next period is due; at once in virtual time."""
@@ -152,16 +173,21 @@ class PlantNode:
         late = self._late_frames(period) if self._is_answer_late else []
         self._turn.begin()
         sent_s, heard = self._converse(period, frames)
-        self._is_answer_late = not self._is_answered(heard)
-        self._follow([frame for _, frame in (*late, *heard)])
+        said = [frame for _, frame in heard]
+        self._is_answer_late = not any(map(self._is_last, said))
+        self._follow([frame for _, frame in late])
+        self._follow(said)
         if self._recorder is not None:
-            for time_s, frame in late:
-                self._recorder.record(time_s, frame, received=True)
-            for frame in frames:
-                self._recorder.record(sent_s, frame, received=False)
-            for time_s, frame in heard:
-                self._recorder.record(time_s, frame, received=True)
-        return self._answer(self._heard([frame for _, frame in heard]))
+            self._record(late, received=True)
+            self._recorder.record(sent_s, frames, received=False)
+            self._record(heard, received=True)
+        return self._answer(self._heard(said))
+
+    def _record(self, stamped: list[StampedFrame], received: bool) -> None:
+        """Frames of one time by one call; in virtual time those are all of a period."""
+        assert self._recorder is not None
+        for time_s, group in groupby(stamped, _TIME):
+            self._recorder.record(time_s, [frame for _, frame in group], received)
 
     def _converse(self, period: int, frames: list[Frame]) -> tuple[float, list[StampedFrame]]:
         """When the frames were published last, in s, and what was heard since."""
@@ -169,10 +195,14 @@ class PlantNode:
         for attempt in range(CONNECT_ATTEMPTS):
             if attempt == 0 or not is_serial_line(self._bus.name):
                 sent_s, heard = self._publish(period, frames), []
-            listened = self._listen(period)
-            self._note_version([frame for _, frame in listened])
+            listened = self._turn.answers(self._bus, period, self._is_last)
             heard += listened
-            self._is_connected = self._is_connected or self._is_answered(heard)
+            if listened and self._turn.sync:
+                # What somebody else says ahead of the ECU must not hide what the ECU says.
+                heard += self._late_frames(period)
+            if not self._is_connected:
+                self._note_version([frame for _, frame in listened])
+                self._is_connected = any(self._is_last(frame) for _, frame in heard)
             if self._is_connected or not self._turn.sync:
                 return sent_s, heard
         if self._foreign_version is not None:
@@ -190,16 +220,8 @@ class PlantNode:
 
     def _publish(self, period: int, frames: list[Frame]) -> float:
         sent_s = self._turn.time_s(period)
-        for frame in frames:
-            self._bus.send(frame)
+        self._bus.send(*frames)
         return sent_s
-
-    def _listen(self, period: int) -> list[StampedFrame]:
-        answers = self._turn.answers(self._bus, period, self._is_last)
-        return [(self._turn.time_s(period), frame) for frame in answers]
-
-    def _is_answered(self, heard: list[StampedFrame]) -> bool:
-        return any(self._is_last(frame) for _, frame in heard)
 
     def _is_last(self, frame: Frame) -> bool:
         """Whether it is the charge command that continues from the last one.
@@ -222,9 +244,13 @@ class PlantNode:
 
     def _command_counter(self, frame: Frame) -> int | None:
         """Counter of an intact charge command; None for any other frame."""
-        if frame.frame_id != self._command.frame_id or not self._command.is_intact(frame.data):
+        if frame.frame_id != self._command_id:
             return None
-        return self._command.counter(frame.data)
+        if frame is not self._checked:
+            is_intact = self._command.is_intact(frame.data)
+            self._checked = frame
+            self._checked_counter = MessageCodec.counter(frame.data) if is_intact else None
+        return self._checked_counter
 
     def _late_frames(self, period: int) -> list[StampedFrame]:
         """What came too late for the last period; it must not pass for an answer to this one."""
@@ -234,42 +260,36 @@ class PlantNode:
         return late
 
     def _frames(self, readings: Readings, request: Request) -> list[Frame]:
-        frames = [
-            self._electrical.frame({"Current": readings.current_A, "Voltage": readings.voltage_V}),
-            self._thermal.frame(
-                {
-                    "SurfaceTemperature": readings.surface_temperature_K,
-                    "CoolantTemperature": readings.coolant_temperature_K,
-                }
-            ),
-            self._coolant.frame({"CoolingPower": readings.cooling_power_W}),
-            self._request.frame(
-                {
-                    "Request": catalog.Request.CHARGE if request.charge else catalog.Request.OFF,
-                    "ReferenceCurrent": request.reference_current_A,
-                    "PlugInStateOfCharge": request.plug_in_soc,
-                }
-            ),
+        values: list[float | None] = [
+            readings.current_A,
+            readings.voltage_V,
+            readings.surface_temperature_K,
+            readings.coolant_temperature_K,
+            readings.cooling_power_W,
+            catalog.Request.CHARGE if request.charge else catalog.Request.OFF,
+            request.reference_current_A,
+            request.plug_in_soc,
         ]
+        messages = len(_PUBLISHED) - 1
         if request.mode is not None:
-            frames.append(
-                self._mode.frame({"Mode": request.mode, "TimeToFull": request.time_to_full_s})
-            )
-        return [*frames, self._sync] if self._turn.sync else frames
+            values += [request.mode, request.time_to_full_s]
+            messages += 1
+        frames = self._publisher.frames(values, messages)
+        if self._turn.sync:
+            frames.append(self._sync)
+        return frames
 
     def _answer(self, heard: list[Frame]) -> Answer:
-        values: Values = {}
+        values, command = self._listener.hear(heard), self._silent_command
         for frame in heard:
-            receiver = self._receivers.get(frame.frame_id)
-            if receiver is not None:
-                values.update(receiver.accept(frame.data) or {})
-            elif frame.frame_id == self._command.frame_id and self._reception.check(frame.data):
-                values.update(self._command.decode(frame.data) or {})
-        self._faults.take(values)
-        is_told = values.get("LatchedFaults") is not None
-        return Answer(
-            values, self._reception.end_period(), self._faults.latched if is_told else None
-        )
+            if frame.frame_id == self._command_id and self._commands.check(frame.data):
+                command = self._command.values(frame.data)
+        answer = Answer(values + command, self._places, None, None)
+        answer.usable_command_A = self._commands.end_period(answer.command_A)
+        self._faults.take(answer.value)
+        if answer.value("LatchedFaults") is not None:
+            answer.latched_faults = self._faults.latched
+        return answer
 
 
 def _label(labels: dict[int, str], value: float | None) -> str | None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Protocol
 
 from hil_sim.bus.buses import CanBus, Frame
-from hil_sim.bus.deadline import Deadline
+from hil_sim.bus.catalog import FrameId
 from hil_sim.nodes.clock import Clock
 from hil_sim.nodes.punctuality import PlantWatch
 
@@ -15,7 +15,11 @@ MOST_FRAMES = 10_000
 WORK_PERIODS = 0.1
 """End of a real-time period in which the plant does not listen but integrates the cell."""
 
+StampedFrame = tuple[float, Frame]
+"""A frame with its time in s."""
 IsLast = Callable[[Frame], bool]
+_COMMAND_ID = int(FrameId.CHARGE_COMMAND)
+"""What an ECU's step ends with."""
 
 
 class Turn(Protocol):
@@ -41,8 +45,8 @@ class Turn(Protocol):
         """Time stamp of a frame that passes in a period."""
         ...
 
-    def answers(self, bus: CanBus, period: int, is_last: IsLast) -> Iterator[Frame]:
-        """Frames of others in a period; is_last tells the last one of an ECU's step."""
+    def answers(self, bus: CanBus, period: int, is_last: IsLast) -> list[StampedFrame]:
+        """Frames of others in a period; is_last tells the charge command of an ECU's step."""
         ...
 
 
@@ -77,18 +81,13 @@ class LockStep:
         """Virtual start of the period, in s since the start of the run."""
         return period * self._period_s
 
-    def answers(self, bus: CanBus, period: int, is_last: IsLast) -> Iterator[Frame]:
+    def answers(self, bus: CanBus, period: int, is_last: IsLast) -> list[StampedFrame]:
         """Frames up to the last one of the ECU's step, or until it has been silent too long."""
         if self._serve is not None:
             self._serve()
-        deadline = Deadline(self._timeout_s)
-        for _ in range(MOST_FRAMES):
-            frame = bus.receive(deadline.left_s)
-            if frame is None:
-                return
-            yield frame
-            if is_last(frame):
-                return
+        frames = bus.gather(_COMMAND_ID, is_last, self._timeout_s, MOST_FRAMES)
+        time_s = self.time_s(period)
+        return [(time_s, frame) for frame in frames]
 
 
 class _OnTime:
@@ -121,12 +120,16 @@ class PacedLockStep(_OnTime, LockStep):
         _OnTime.__init__(self, period_s, clock)
         LockStep.__init__(self, period_s, timeout_s, serve)
 
-    def answers(self, bus: CanBus, period: int, is_last: IsLast) -> Iterator[Frame]:
+    def answers(self, bus: CanBus, period: int, is_last: IsLast) -> list[StampedFrame]:
         """The frames of lock step; notes when the last one of the ECU's step came."""
-        for frame in super().answers(bus, period, is_last):
-            if is_last(frame):
+
+        def noted(frame: Frame) -> bool:
+            ends = is_last(frame)
+            if ends:
                 self._watch.answered(self._clock.now_s())
-            yield frame
+            return ends
+
+        return super().answers(bus, period, noted)
 
 
 class OnClock(_OnTime):
@@ -142,12 +145,14 @@ class OnClock(_OnTime):
         """Wall-clock time since the first period began."""
         return self._clock.now_s() - self._watch.slots.start_s
 
-    def answers(self, bus: CanBus, period: int, is_last: IsLast) -> Iterator[Frame]:
+    def answers(self, bus: CanBus, period: int, is_last: IsLast) -> list[StampedFrame]:
         """Every frame until the plant's own work for the next period has to begin."""
+        heard = list[StampedFrame]()
         end_s = self._watch.slots.due_s - self._work_s
         while (left_s := end_s - self._clock.now_s()) > 0.0:
             frame = bus.receive(left_s)
             if frame is not None:
                 if is_last(frame):
                     self._watch.answered(self._clock.now_s())
-                yield frame
+                heard.append((self.time_s(period), frame))
+        return heard

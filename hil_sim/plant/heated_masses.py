@@ -29,6 +29,7 @@ class HeatedMasses:
         self, heat_W: float, soc_after: float, cooling_power_W: float, extremes: Extremes
     ) -> None:
         """One control period of constant heat (W) into the core; the peaks go into `extremes`."""
+        extremes.add_heat(heat_W, SUB_STEPS * self._step_s)
         state = self.state._replace(soc=soc_after)
         heating_K_per_s = heat_W / self._cell.core_heat_capacity_J_per_K
         before = self._heated(self._knot, heating_K_per_s)

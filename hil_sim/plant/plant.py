@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice
 
-from bms.cell import Disturbance, integrate_step, polarisation_after_V, terminal_voltage_V
+from bms.cell import CellState, Polarisation
 from bms.presets import Preset
 from bms.presets.schema import Limits
+from hil_sim.native._native import ffi, lib
+from hil_sim.native.cell_fields import cell_fields
 from hil_sim.plant.disturbances import Source, core_growth
 from hil_sim.plant.true_cell import TrueCell, cooling_share, nominal_cell
 
@@ -23,6 +26,12 @@ class Extremes:
     soc: float
     min_anode_potential_V: float | None = None
     """Least, where the plant has electrodes: lithium plates below 0."""
+    heat_J: float | None = None
+    """Not an extreme: heat that the cell has produced so far, where the plant knows it."""
+
+    def add_heat(self, heat_W: float, duration_s: float) -> None:
+        """A constant heat flow in W has lasted for some time."""
+        self.heat_J = (self.heat_J or 0.0) + heat_W * duration_s
 
     def violations(self, limits: Limits) -> list[str]:
         """Each limit that was exceeded, by however little, as text with both figures."""
@@ -48,31 +57,54 @@ class Plant:
     """One cell with its coolant and its cooling power, driven by a current (A).
 
     `current_A` (negative while charging) is set from outside and held over a control period; the
-    disturbance has a knot at every sub-step.
+    disturbance has a knot at every sub-step. The cell is the one of the campaigns, in C.
     """
 
     def __init__(
         self, preset: Preset, disturbance: Source, true_cell: TrueCell | None = None
     ) -> None:
-        """The preset's own cell at its start, or another one."""
+        """The preset's own cell at its start, or another one; InputError as cell_fields."""
         true_cell = true_cell or nominal_cell(preset)
-        self._cell = true_cell.cell
         self._bounds = preset.uncertainty
         self._reference_A = preset.limits.reference_current_A
-        self._step_s = preset.timing.sampling_period_s / SUB_STEPS
+        step_s = preset.timing.sampling_period_s / SUB_STEPS
+        self._period_s = preset.timing.sampling_period_s
+        self._heat_J = 0.0
+        self._cell = ffi.new("cell_t *", cell_fields(true_cell.cell, step_s))
+        self._memory = ffi.new(
+            "cell_memory_t *",
+            {"state": tuple(true_cell.state), "polarisation_V": true_cell.polarisation_V},
+        )
         self._source = disturbance
-        self._knot = next(disturbance)
+        self._knot = ffi.new("cell_state_t *", tuple(map(float, next(disturbance))))
+        self._knots = ffi.new("double[]", SUB_STEPS * lib.CELL_KNOT_WIDTH)
+        self._peaks = ffi.new("cell_peaks_t *")
         self._full_cooling_W = true_cell.cooling_power_W
         self._coolant_floor_K = true_cell.coolant_floor_K
         self.current_A = 0.0
-        self.state = true_cell.state
-        self.polarisation_V = true_cell.polarisation_V
-        self.extremes = Extremes(
-            self.state.core_temperature_K,
-            self.state.surface_temperature_K,
-            self.voltage_V,
-            self.state.soc,
+        self.state = self._state_now()
+        """True state, as it was when the last period ended."""
+        peaks = self._peaks
+        peaks.soc, peaks.voltage_V = self.state.soc, self.voltage_V
+        peaks.core_temperature_K = self.state.core_temperature_K
+        peaks.surface_temperature_K = self.state.surface_temperature_K
+
+    @property
+    def extremes(self) -> Extremes:
+        """Largest true values at any sub-step so far."""
+        peaks = self._peaks
+        return Extremes(
+            peaks.core_temperature_K,
+            peaks.surface_temperature_K,
+            peaks.voltage_V,
+            peaks.soc,
+            heat_J=self._heat_J,
         )
+
+    @property
+    def polarisation_V(self) -> Polarisation:
+        """Voltage of each branch in V."""
+        return tuple(self._memory.polarisation_V)[: self._cell.branches]
 
     @property
     def cooling_power_W(self) -> float:
@@ -87,50 +119,34 @@ class Plant:
     @property
     def voltage_V(self) -> float:
         """Terminal voltage in V at the present state and current."""
-        return float(
-            terminal_voltage_V(
-                self._cell,
-                self.state.soc,
-                self.current_A,
-                self.state.core_temperature_K,
-                self.polarisation_V,
-            )
-        )
+        volts: float = lib.cell_terminal_voltage_V(self._cell, self._memory, self.current_A)
+        return volts
 
     def advance(self) -> None:
         """Hold the present current for one control period."""
-        current_A, cell, extremes = self.current_A, self._cell, self.extremes
-        step_s, cooling_W = self._step_s, self.cooling_power_W
-        growth = core_growth(self._bounds, current_A, self._reference_A)
-        is_plain = cell.resistance is None and not cell.branches
-        before = _grown(self._knot, growth)
-        highest_soc = self.state.soc
-        if not is_plain:
-            extremes.voltage_V = max(extremes.voltage_V, self.voltage_V)
-        for _ in range(SUB_STEPS):
-            self._knot = next(self._source)
-            after = _grown(self._knot, growth)
-            volts = self.polarisation_V
-            self.state = integrate_step(
-                cell, self.state, current_A, cooling_W, step_s, before, after, volts
-            )
-            before = after
-            soc, core_K, surface_K, _ = self.state
-            highest_soc = max(highest_soc, soc)
-            extremes.core_temperature_K = max(extremes.core_temperature_K, core_K)
-            extremes.surface_temperature_K = max(extremes.surface_temperature_K, surface_K)
-            if not is_plain:
-                self.polarisation_V = polarisation_after_V(cell, volts, current_A, step_s)
-                extremes.voltage_V = max(extremes.voltage_V, self.voltage_V)
-        extremes.soc = max(extremes.soc, highest_soc)
-        if is_plain:
-            # At one current the voltage rises with the state of charge, so its peak is there.
-            peak_V = float(terminal_voltage_V(cell, highest_soc, current_A))
-            extremes.voltage_V = max(extremes.voltage_V, peak_V)
+        current_A = self.current_A
+        self._knots[0 : len(self._knots)] = [
+            value for knot in islice(self._source, SUB_STEPS) for value in knot
+        ]
+        memory = self._memory
+        heat_W = lib.cell_heat_W(self._cell, ffi.addressof(memory.state), current_A)
+        heat_W += lib.cell_polarisation_heat_W(self._cell, memory.polarisation_V)
+        self._heat_J += heat_W * self._period_s
+        lib.cell_hold(
+            self._cell,
+            self._memory,
+            current_A,
+            self.cooling_power_W,
+            core_growth(self._bounds, current_A, self._reference_A),
+            self._knot,
+            self._knots,
+            SUB_STEPS,
+            self._peaks,
+            ffi.NULL,
+            ffi.NULL,
+        )
+        self.state = self._state_now()
 
-
-def _grown(knot: Disturbance, growth: float) -> Disturbance:
-    """A knot of a source, whose core is that of the reference current, at another current."""
-    if growth == 1.0:
-        return knot
-    return knot._replace(core_K_per_s=knot.core_K_per_s * growth)
+    def _state_now(self) -> CellState:
+        state = self._memory.state
+        return CellState(state.soc, state.core, state.surface, state.coolant)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from operator import add
 from typing import NamedTuple
 
 import numpy as np
 
 from bms.presets.schema import Sensor, Sensors
+
+_BLOCK = 500
+"""Readings whose noise is drawn at once; the numbers are those of one draw a reading."""
 
 
 class Readings(NamedTuple):
@@ -23,18 +28,30 @@ class SensorSuite:
     """Turns true values into readings; deterministic for a given generator."""
 
     def __init__(self, sensors: Sensors, rng: np.random.Generator) -> None:
-        self._channels: list[Sensor] = [getattr(sensors, name) for name in Readings._fields]
+        channels: list[Sensor] = [getattr(sensors, name) for name in Readings._fields]
+        self._biases = [sensor.bias for sensor in channels]
+        self._resolutions = [sensor.resolution for sensor in channels]
+        self._noise_std = np.array([sensor.noise_std for sensor in channels])
         self._rng = rng
+        self._noise: Iterator[list[float]] = iter(())
 
     def read(self, truth: Readings) -> Readings:
         """Reading of each channel: truth, bias and noise, rounded to the resolution."""
-        normals = self._rng.standard_normal(len(truth)).tolist()
-        return Readings(*map(_reading, self._channels, truth, normals))
+        noise = next(self._noise, None)
+        if noise is None:
+            self._noise = iter(self._drawn())
+            noise = next(self._noise)
+        values = map(add, map(add, truth, self._biases), noise)
+        return Readings(
+            *[
+                value if resolution == 0.0 else resolution * round(value / resolution)
+                for value, resolution in zip(values, self._resolutions)
+            ]
+        )
 
-
-def _reading(sensor: Sensor, truth: float, normal: float) -> float:
-    noise = sensor.noise_std * min(max(normal, -Sensor.NOISE_CUTOFF), Sensor.NOISE_CUTOFF)
-    value = truth + sensor.bias + noise
-    if sensor.resolution == 0.0:
-        return value
-    return sensor.resolution * round(value / sensor.resolution)
+    def _drawn(self) -> list[list[float]]:
+        """Noise of the next readings."""
+        normals = self._rng.standard_normal((_BLOCK, len(self._noise_std)))
+        cut = np.clip(normals, -Sensor.NOISE_CUTOFF, Sensor.NOISE_CUTOFF)
+        noise: list[list[float]] = (self._noise_std * cut).tolist()
+        return noise

@@ -47,6 +47,8 @@ def figures(limits: Limits, results: list[RunResult]) -> list[Figure]:
         ("State of charge at the end", "final_soc", "{:.4f}"),
         ("Charging time", "charge_time_s", "{:.1f} s"),
         ("First derating after", "first_derate_s", "{:.1f} s"),
+        ("Mean core temperature", "mean_core_temperature_K", "{:.2f} K"),
+        ("Heat produced", "heat_J", "{:.0f} J"),
         ("Core estimate: RMS error", "kan_rmse_K", "{:.4f} K"),
         ("Core estimate: largest error", "kan_max_abs_error_K", "{:.3f} K"),
         ("Core estimate: error bound", "error_bound_K", "{:.3f} K"),

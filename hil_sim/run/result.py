@@ -116,6 +116,10 @@ class Summary:
     plant: str = DEFAULT_PLANT
     min_anode_potential_V: float | None = None
     """Least over the run; None where the plant has no electrodes."""
+    mean_core_temperature_K: float | None = None
+    """Over the charge; None where none began."""
+    heat_J: float | None = None
+    """Produced by the cell over the run; None where the plant does not tell it."""
     optimum_time_s: float | None = None
     """Time to full that no controller can beat, by physics alone; None where it is not known."""
     time_over_optimum: float | None = None

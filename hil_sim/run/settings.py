@@ -66,10 +66,13 @@ class Settings:
 
     @property
     def mode_name(self) -> str | None:
-        """The mode as on the command line; None without, and for a controller that has none."""
-        if self.mode is None or self.controller is not ControllerKind.KAN_RCBF:
+        """The mode as on the command line; None for a controller that has none.
+
+        A charger that does not ask for one gets the fastest charge.
+        """
+        if self.controller is not ControllerKind.KAN_RCBF:
             return None
-        return self.mode.label.replace("_", "-")
+        return (Mode.FASTEST if self.mode is None else self.mode).label.replace("_", "-")
 
     @property
     def name(self) -> str:

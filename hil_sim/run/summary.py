@@ -77,6 +77,8 @@ def sum_up(
         line_losses=losses if is_serial_line(settings.bus) else None,
         plant=settings.plant,
         min_anode_potential_V=extremes.min_anode_potential_V,
+        mean_core_temperature_K=mean_core_temperature_K(series),
+        heat_J=extremes.heat_J,
         optimum_time_s=None if bound is None else bound.optimum_time_s,
         time_over_optimum=None if bound is None else _over(charge_time_s, bound.optimum_time_s),
         lower_bound_s=None if bound is None else bound.lower_bound_s,
@@ -110,6 +112,14 @@ def first_derate_s(series: TimeSeries) -> float | None:
     """First time in s at which a constraint allowed less than was asked for."""
     derated = (t for t, state in zip(series.time_s, series.state) if state == DERATED_STATE)
     return next(derated, None)
+
+
+def mean_core_temperature_K(series: TimeSeries) -> float | None:
+    """Mean over the control periods of the charge, None without any."""
+    cores_K = [
+        core_K for time_s, core_K in zip(series.time_s, series.core_temperature_K) if time_s >= 0.0
+    ]
+    return math.fsum(cores_K) / len(cores_K) if cores_K else None
 
 
 def infeasible_steps(series: TimeSeries) -> int:

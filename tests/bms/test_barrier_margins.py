@@ -12,7 +12,7 @@ import pytest
 from bms.barrier import barrier_constants, sampling_margins
 from bms.barrier.constraints import charging_current_A, left_hand_sides
 from bms.barrier.rates import Weights, heat_range_W, largest_rate
-from bms.barrier.readings import soc_error_bound
+from bms.barrier.readings import soc_error_bound, soc_reserve
 from bms.barrier.rounding import ROUNDINGS, UNIT, rounding_allowances
 from bms.bus_signals import BusQuantisation
 from bms.cell import CellState, Disturbance, integrate_step, rates, terminal_voltage_V
@@ -145,7 +145,7 @@ def test_heat_range_holds_every_heat_of_charging(preset, entropy_V_per_K):
 
 
 def reading(random, preset, state):
-    """The state as the firmware may read it: every channel off by its bound, either way."""
+    """The state that decides: every channel off by its bound either way, the charge at its most."""
 
     def off(sensor, bus_step):
         return random.choice([-1.0, 1.0], RUNS) * (sensor.error_bound + bus_step)
@@ -154,7 +154,8 @@ def reading(random, preset, state):
     return (
         CellState(
             state.soc
-            + random.choice([-1.0, 1.0], RUNS) * soc_error_bound(preset.cell, preset, BUS),
+            + random.choice([-1.0, 1.0], RUNS) * soc_error_bound(preset.cell, preset, BUS)
+            + soc_reserve(preset.cell, preset),
             state.core_temperature_K,
             state.surface_temperature_K
             + off(sensors.surface_temperature_K, BUS.surface_temperature_K),
@@ -211,7 +212,8 @@ def test_the_voltage_stays_below_its_limit_until_the_next_command(preset):
         -limits.reference_current_A * (timing.sampling_period_s + timing.delay_s) / cell.capacity_As
     )
     for counted_soc in (true_soc - error, true_soc + error):
-        spare_V = limits.max_voltage_V - cell.ocv(counted_soc) - margin_V
+        deciding_soc = counted_soc + soc_reserve(cell, preset)
+        spare_V = limits.max_voltage_V - cell.ocv(deciding_soc) - margin_V
         current_A = np.maximum(-spare_V / cell.ohmic_resistance_ohm, limits.reference_current_A)
         voltage_V = terminal_voltage_V(cell, true_soc + charged, np.minimum(current_A, 0.0))
         assert np.max(voltage_V) <= limits.max_voltage_V
@@ -296,7 +298,6 @@ def test_with_no_time_and_perfect_sensors_only_arithmetic_needs_a_margin(preset)
     assert margins.core_K_per_s == pytest.approx(rounding.core_K_per_s, abs=1e-10)
     assert margins.surface_K_per_s2 == pytest.approx(rounding.surface_K_per_s2, abs=1e-10)
     counting = ROUNDINGS * UNIT
-    counted_per_s = preset.gains.alpha1_per_s * counting
-    assert margins.soc_per_s == pytest.approx(rounding.soc_per_s + counted_per_s, abs=1e-12)
+    assert margins.soc_per_s == pytest.approx(rounding.soc_per_s, abs=1e-12)
     steepest_V = np.max(np.diff(preset.cell.ocv.voltage_V) / np.diff(preset.cell.ocv.soc))
     assert rounding.voltage_V < margins.voltage_V < rounding.voltage_V + 1.5 * steepest_V * counting

@@ -95,7 +95,13 @@ def refused(load, path, value):
 
 
 def test_the_shipped_presets_are_these_and_carry_their_names():
-    assert preset_names() == ["a123_26650", "a123_26650_10C", "lin2014", "paper_calibrated"]
+    assert preset_names() == [
+        "a123_26650",
+        "a123_26650_10C",
+        "lin2014",
+        "paper_calibrated",
+        "samsung_30q",
+    ]
     for name in preset_names():
         preset = load_preset(name)
         assert preset.name == name
@@ -106,7 +112,10 @@ def test_a_copy_by_path_is_the_same_preset(load):
     assert load() == load_preset(DEFAULT_PRESET)
 
 
-@pytest.mark.parametrize("path", ALL, ids=names(ALL))
+NEEDED = [path for path in ALL if path != ("gains", "surface_condition")]
+
+
+@pytest.mark.parametrize("path", NEEDED, ids=names(NEEDED))
 def test_a_missing_key_is_named(load, path):
     assert ".".join(path) in refused(load, path, ...)
 
@@ -164,7 +173,7 @@ def test_a_range_that_does_not_rise_is_named(load, key):
         (("initial", "soc"), 1.01, "initial.soc"),
         (("timing", "sampling_period_s"), 0.0015, "sampling_period_s: Input should be a multiple"),
         (("timing", "sampling_period_s"), 0.1001, "sampling_period_s: Input should be a multiple"),
-        (("gains", "alpha3_per_s2"), 0.0901, "gains"),
+        (("gains", "alpha3_per_s2"), 0.172, "gains"),
         (("gains", "alpha4_per_s"), 0.44, "gains"),
     ],
 )
@@ -173,7 +182,8 @@ def test_values_that_do_not_go_together_are_refused(load, path, value, named):
 
 
 def test_gains_with_a_double_real_root_are_the_last_that_are_accepted(load):
-    assert load(("gains", "alpha3_per_s2"), 0.09).gains.alpha3_per_s2 == 0.09
+    double_root = 0.829**2 / 4.0
+    assert load(("gains", "alpha3_per_s2"), double_root).gains.alpha3_per_s2 == double_root
 
 
 def test_the_core_gain_defaults_to_the_core_time_constant(load):

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from bms.model.pair import load_pair
+from bms.presets.paper_form import in_paper_form
 from bms.verification import CLASHING_DELTA4, SLIPS, Slip, verify
 from bms.verification.closed_loop import SlipCost, slip_cost
 from bms.verification.conditions import decided_conditions, firmware_constants, required_conditions
@@ -25,7 +26,8 @@ UNSAFE = [
 
 @cache
 def pair(name: str):
-    return load_pair(name, None)
+    preset, model = load_pair(name, None)
+    return in_paper_form(preset), model
 
 
 def constants(name: str, *slips: Slip) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from bms.commands.verify import verify as command
 from bms.firmware import Firmware
 from bms.model.pair import load_pair
 from bms.presets import load_preset, one_cell_preset_names
+from bms.presets.paper_form import in_paper_form
 from bms.verification import SLIPS, Verification, verify
 from bms.verification.barriers import Barrier
 from bms.verification.conditions import (
@@ -51,7 +52,8 @@ def corrected(name: str) -> Verification:
 
 @cache
 def printed(name: str) -> Verification:
-    return verify(*load_pair(name, None), SLIPS, largest_boxes=50_000)
+    preset, model = load_pair(name, None)
+    return verify(in_paper_form(preset), model, SLIPS, largest_boxes=50_000)
 
 
 def counter_examples(result: Verification) -> list[CounterExample]:
@@ -71,7 +73,7 @@ def test_the_shipped_presets_are_certified(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_the_printed_formulas_yield_a_safe_state_that_fails_in_simulation(name):
     result = printed(name)
-    preset = load_preset(name)
+    preset = in_paper_form(load_preset(name))
     limits, bounds = preset.limits, preset.uncertainty
 
     examples = counter_examples(result)
@@ -218,7 +220,7 @@ def test_the_decision_that_is_reasoned_about_is_the_firmwares(name):
         )
         lower_A, upper_A, active = decide(constants, reading, 0.5, -23.0)
         decision = firmware.solve(
-            soc=reading.soc,
+            soc=reading.soc + constants["soc_error"],
             core_temperature_K=reading.core_temperature_K,
             surface_temperature_K=surface_K,
             coolant_temperature_K=reading.coolant_temperature_K,

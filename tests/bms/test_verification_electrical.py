@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bms.barrier.margins import charge_taken_up, sampling_margins, strongest_current_A
-from bms.barrier.readings import soc_error_bound
+from bms.barrier.readings import soc_error_bound, soc_reserve
 from bms.barrier.rounding import rounding_allowances
 from bms.bus_signals import BUS
 from bms.firmware import Firmware
@@ -74,7 +74,7 @@ def test_no_decision_of_the_firmware_passes_the_voltage_limit_within_its_hold(pr
     )
     for soc in counted[(counted >= 0.0) & (counted < limits.completion_soc)]:
         decision = firmware.solve(
-            soc=float(soc),
+            soc=float(soc) + soc_reserve(cell, preset),
             core_temperature_K=cold_K,
             surface_temperature_K=cold_K,
             coolant_temperature_K=cold_K,
@@ -96,7 +96,6 @@ def test_no_decision_of_the_firmware_passes_the_voltage_limit_within_its_hold(pr
 LOWERED = {
     "arithmetic and bus": lambda preset: rounding_allowances(preset.cell, preset).voltage_V,
     "a millionth of the capacity": lambda preset: 1e-6 * _steepest_V(preset),
-    "counting": lambda preset: soc_error_bound(preset.cell, preset) * _flattest_V(preset),
     "hold": lambda preset: (
         _flattest_V(preset)
         * charge_taken_up(preset.cell, preset, BUS, strongest_current_A(preset, BUS))
@@ -134,6 +133,17 @@ def test_a_voltage_margin_without_one_of_its_parts_is_refused(name, part):
 
 
 @pytest.mark.parametrize("name", one_cell_preset_names())
+def test_a_count_that_decides_without_its_error_is_refused(name):
+    preset = load_preset(name)
+    constants = firmware_constants(preset, model_for(preset))
+    assert certify_voltage(preset, constants)[0].holds
+    assert not certify_voltage(preset, constants | {"soc_error": 0.0})[0].holds
+    charge = with_limits(OTHERS["nmc_pouch"], completion_soc=1.0)
+    constants = firmware_constants(charge, model_for(charge))
+    assert not certify_soc(charge, constants | {"soc_error": 0.0}).holds
+
+
+@pytest.mark.parametrize("name", one_cell_preset_names())
 def test_the_voltage_certificate_has_hardly_more_room_than_it_states(name):
     """Up to what it leaves the margin may be lowered, and no more than a microvolt further."""
     preset = load_preset(name)
@@ -156,7 +166,8 @@ def test_the_worst_of_the_voltage_certificate_is_that_of_a_dense_search(name):
         sampling_margins(cell, preset),
         rounding_allowances(cell, preset).voltage_V,
     )
-    spare_V = limits.max_voltage_V - margins.voltage_V - cell.ocv(counted)
+    at_most = counted + soc_reserve(cell, preset)
+    spare_V = limits.max_voltage_V - margins.voltage_V - cell.ocv(at_most)
     current_A = np.minimum(spare_V / cell.ohmic_resistance_ohm, -limits.reference_current_A)
     charges = current_A > 0.0
     later_soc = (

@@ -73,6 +73,7 @@ def damaged_images(image: bytes) -> dict[str, Damaged]:
     top, entry = struct.unpack_from("<2I", application, VECTORS)
     end = start + len(application)
     layout = Header.parse(application).calibration_layout
+    longest = Header.parse(application).calibration_length
     version = Header.parse(application).firmware_version
     swapped = with_parts(image, calibration, application)
     erased = bytes([0xFF])
@@ -120,9 +121,11 @@ def damaged_images(image: bytes) -> dict[str, Damaged]:
         "calibration too short": bad_calibration(
             "WRONG_LENGTH", resealed(calibration, length=HEADER_LENGTH)
         ),
-        "calibration shorter than the application's": bad_calibration(
-            "WRONG_CALIBRATION_LAYOUT",
-            resealed(calibration[:-4], length=len(calibration) - 4),
+        "calibration shorter than its model": bad_calibration(
+            "WRONG_CONTENT", resealed(calibration[:-4], length=len(calibration) - 4)
+        ),
+        "calibration longer than its model": bad_calibration(
+            "WRONG_CONTENT", resealed(calibration + bytes(4), length=len(calibration) + 4)
         ),
         "calibration damaged": bad_calibration("WRONG_CRC", flipped(calibration, 8 * 500)),
         "calibration header of another layout": bad_calibration(
@@ -137,9 +140,7 @@ def damaged_images(image: bytes) -> dict[str, Damaged]:
             "WRONG_CALIBRATION_LAYOUT",
         ),
         "calibration of another length": Damaged(
-            with_parts(
-                image, resealed(application, calibration_length=len(calibration) + 8), calibration
-            ),
+            with_parts(image, resealed(application, calibration_length=longest + 8), calibration),
             "CALIBRATION",
             "WRONG_CALIBRATION_LAYOUT",
         ),

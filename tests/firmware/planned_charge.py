@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
-from bms.barrier import barrier_constants
 from bms.firmware import Ecu
-from bms.presets import Preset, load_preset
+from bms.presets import load_preset
 from hil_sim.bus.catalog import Mode
 from hil_sim.run.result import RunResult
 from hil_sim.run.session import run_both
@@ -30,25 +29,14 @@ def charge(
     mode: Mode | None = None,
     full_by_s: float | None = None,
     strongest_A: float | None = None,
-    surface_condition: str = "paper",
 ) -> RunResult:
     """A whole charge by the firmware over a bus.
 
-    `strongest_A` takes the place of the preset's reference current, and the surface's reserve is
-    that of a condition other than the preset's.
+    `strongest_A` takes the place of the preset's reference current.
     """
     settings = replace(starting_at(preset, temperature_K), mode=mode, full_by_s=full_by_s)
-    changes = {"delta4_K_per_s2": surface_reserve_K_per_s2(settings.preset, surface_condition)}
-    if strongest_A is not None:
-        changes["reference_current_A"] = strongest_A
+    changes = {} if strongest_A is None else {"reference_current_A": strongest_A}
     return run_both(settings, ecu_factory=lambda plant, database: Ecu(preset, changes=changes))
-
-
-def surface_reserve_K_per_s2(preset: Preset, condition: str) -> float:
-    """Delta4 of the preset's cell under one of the surface's two conditions."""
-    gains = replace(preset.gains, surface_condition=condition)  # type: ignore[arg-type]
-    constants = barrier_constants(preset.cell, replace(preset, gains=gains))
-    return float(constants.delta4_K_per_s2)
 
 
 def time_s(result: RunResult) -> float:

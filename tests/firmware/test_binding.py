@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from bms.errors import InputError
+from bms.firmware._firmware import ffi
 from bms.firmware.batches import ChargeBatch, DecisionBatch, EstimateBatch
-from bms.firmware.calibration import calibration_bytes, calibration_hashes
+from bms.firmware.calibration import calibration_bytes, calibration_hashes, used_bytes
 from bms.firmware.controller import Firmware
 from bms.firmware.image_checks import ImagePart, calibration_status
 from bms.firmware.image_header import HEADER_LENGTH
@@ -73,8 +74,20 @@ def test_hashes_of_a_calibration_are_those_of_model_and_preset(pair):
     content = calibration_bytes(preset, model)
     assert calibration_hashes(content) == (int(model.hash[:8], 16), int(preset.hash[:8], 16))
     assert calibration_hashes(content + b"behind") == calibration_hashes(content)
+    assert calibration_hashes(content[:12]) == calibration_hashes(content)
+    with pytest.raises(ValueError, match="12 bytes of a block"):
+        calibration_hashes(content[:11])
+
+
+def test_a_block_is_cut_behind_the_tables_and_only_a_whole_one(pair):
+    content = calibration_bytes(*pair)
+    whole = content.ljust(ffi.sizeof("bms_calibration_t"), b"\x55")
+    assert used_bytes(whole) == content
     with pytest.raises(ValueError, match="calibration block"):
-        calibration_hashes(content[:-1])
+        used_bytes(whole[:-1])
+    kan = ffi.offsetof("bms_calibration_t", "kan")
+    with pytest.raises(ValueError, match="exceeds the maxima"):
+        used_bytes(whole[:kan] + bytes([4]) + whole[kan + 1 :])  # layers
 
 
 def test_a_calibration_is_checked_against_a_whole_header_only():

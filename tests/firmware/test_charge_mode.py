@@ -26,8 +26,8 @@ def active(bench: Bench) -> set[int]:
     return {n for n in range(20) if bits >> n & 1}
 
 
-def test_the_fixed_mode_charges_as_no_mode_does() -> None:
-    with_mode, without = bench_with(FIXED), Bench()
+def test_who_asks_for_no_mode_gets_the_fastest_charge() -> None:
+    with_mode, without = bench_with(FASTEST), Bench()
     report = DATABASE.get_message_by_name("NetworkDiagnostics")
     of_the_network = {signal.name for signal in report.signals}
 
@@ -37,6 +37,7 @@ def test_the_fixed_mode_charges_as_no_mode_does() -> None:
 
     for period in range(60):
         assert said(with_mode, period) == said(without, period)
+        assert ("PlannedCurrent" in without.answer) == (period % PLAN_EVERY == 0)
     assert without.command_A < -5.0
 
 
@@ -52,9 +53,9 @@ def test_a_planned_mode_charges_and_tells_its_plan(mode: int) -> None:
     assert 150.0 < plans[-1]["PredictedTimeToFull"] < 901.0
 
 
-@pytest.mark.parametrize("mode", [None, FIXED, UNKNOWN])
-def test_no_plan_is_told_to_who_has_not_asked_for_one(mode: int | None) -> None:
-    bench = Bench() if mode is None else bench_with(mode)
+@pytest.mark.parametrize("mode", [FIXED, UNKNOWN])
+def test_no_plan_is_told_to_who_wants_none(mode: int) -> None:
+    bench = bench_with(mode)
     bench.start()
     assert not any("PlannedCurrent" in bench.period() for _ in range(4 * PLAN_EVERY))
 

@@ -28,6 +28,15 @@ def test_crc_is_that_of_profile_2(data: bytes, ids: bytes) -> None:
     assert lib.e2e_crc(data, len(data), ids) == expected
 
 
+@pytest.mark.parametrize("at", [1, 2])
+def test_the_crc_takes_every_byte(at: int) -> None:
+    for value in range(256):
+        data = bytes([0, 0, 0x5A])
+        data = data[:at] + bytes([value]) + data[at + 1 :]
+        expected = cantools.autosar.compute_profile2_crc(data, 0xC3)
+        assert lib.e2e_crc(data, len(data), bytes([0xC3] * 16)) == expected, value
+
+
 @given(data=PAYLOAD, ids=IDS, counter=st.integers(0, 255))
 def test_protected_frame_passes_the_check_of_others_and_keeps_its_content(
     data: bytes, ids: bytes, counter: int

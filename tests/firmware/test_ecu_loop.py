@@ -51,8 +51,8 @@ class Port:
         }
         self._functions = ffi.new("scripted_port_t *", self._callbacks)
         self.bind()
-        self._loop = ffi.new("ecu_loop_t *")
-        lib.ecu_loop_init(self._loop, ffi.addressof(lib, "BMS_DEFAULT_CALIBRATION"))
+        self.loop = ffi.new("ecu_loop_t *")
+        lib.ecu_loop_init(self.loop, ffi.addressof(lib, "BMS_DEFAULT_CALIBRATION"))
 
     def bind(self) -> None:
         """Make this the board that the C sources know; there is one at a time."""
@@ -61,7 +61,7 @@ class Port:
     def run_until(self, time_ms: int) -> None:
         while self.now_ms < time_ms:
             self._end_ms = time_ms
-            self._lib.ecu_loop_turn(self._loop)
+            self._lib.ecu_loop_turn(self.loop)
 
     def command(self) -> dict[str, Any]:
         """The last charge command; no current before the first one."""
@@ -80,6 +80,7 @@ class Port:
             values |= {"Voltage": HEALTHY["Voltage"] - OHMIC_RESISTANCE_OHM * current_A}
             frames = (*(frame(name, period, values) for name in MEASURED), *after)
             self.waiting += [(self.now_ms, f) for f in frames]
+            self.waiting.sort(key=lambda timed: timed[0])
             self.run_until(start_ms + round((period + 1 - first) * period_ms))
 
     def step_times_ms(self) -> list[int]:

@@ -63,7 +63,7 @@ def test_the_greatest_of_a_table_is_that_of_all_cells_that_are_touched(
 
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.0, 1.0), st.lists(st.tuples(st.floats(-400.0, 5.0), st.integers(1, 30))))
-def test_a_charge_keeps_the_greatest_of_what_its_bounds_span(
+def test_a_charge_keeps_the_greatest_of_what_its_bounds_span_and_meets_the_next_cell_without_a_jump(
     code: FamilyCode, told_soc: float, parts: list[tuple[float, int]]
 ) -> None:
     family, reading = code.observer(), code.reading()
@@ -81,7 +81,13 @@ def test_a_charge_keeps_the_greatest_of_what_its_bounds_span(
                 first, last = (
                     min(int(at * len(cells)), len(cells) - 1) for at in (family.soc_low.soc, high)
                 )
-                assert getattr(family, name) == cells[first : last + 1].max()
+                greatest = cells[first : last + 1].max()
+                rise = max(0.0, cells[min(last + 1, len(cells) - 1)] - greatest)
+                quarters = np.clip(4.0 * (high * len(cells) - last) - 3.0, 0.0, 1.0)
+                assert getattr(family, name) >= greatest
+                assert getattr(family, name) == pytest.approx(
+                    greatest + quarters * rise, abs=1e-5 * abs(cells).max()
+                )
 
 
 @settings(max_examples=100, deadline=None)

@@ -17,6 +17,7 @@ from bms.firmware._firmware import ffi, lib
 from bms.image import MEMORY_MAP, TARGETS, Header, calibration_of, calibration_part, check_image
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
+from bms.tables import network_tables
 from tests.firmware.ports import BOARDS, CROSS, ROOT, build, built, image, needs_compiler
 
 HEADER_FIELDS = 10
@@ -132,9 +133,21 @@ def test_another_model_s_calibration_is_what_the_target_s_compiler_makes(
     source, target = tmp_path / "calibration_default.c", tmp_path / "calibration_default.o"
     output(*COMPILER, *INCLUDES, "-fdata-sections", "-c", source, "-o", target)
     block = section(target, ".rodata.BMS_DEFAULT_CALIBRATION", tmp_path)
+    assert len(block) == ffi.sizeof("bms_calibration_t")
     part = (tmp_path / "calibration.bin").read_bytes()
-    assert part[-len(block) :] == block
-    assert Header.parse(part).length == len(part) == 4 * HEADER_FIELDS + len(block)
+    content = part[4 * HEADER_FIELDS :]
+    assert block[: len(content)] == content
+    assert not block[len(content) :].strip(b"\0"), "all that the tables hold"
+    assert Header.parse(part).length == len(part)
+
+
+def test_a_calibration_ends_with_the_tables_of_its_model() -> None:
+    preset, model = load_pair(DEFAULT_PRESET, None)
+    tables = network_tables(model.network)
+    edges, cells = len(tables.edges), tables.cells
+    fixed = ffi.offsetof("bms_calibration_t", "kan") + ffi.offsetof("kan_model_t", "tables")
+    expected = 4 * HEADER_FIELDS + fixed + 4 * edges * (cells + 1 + 8 * cells)
+    assert len(calibration_part(preset, model)) == expected
 
 
 def from_hex(text: str) -> dict[int, int]:

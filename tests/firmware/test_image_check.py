@@ -27,7 +27,7 @@ from tests.firmware.ports import image, needs_compiler
 
 pytestmark = needs_compiler
 
-SOURCES = [FIRMWARE / "image" / "image.c"]
+SOURCES = [FIRMWARE / "image" / "image.c", FIRMWARE / "src" / "kan.c"]
 HEADERS = [
     f"include/{name}.h"
     for name in ("kan", "soc", "rcbf", "family", "planner", "thermal", "calibration")
@@ -53,7 +53,8 @@ MUTANTS = {
     "Thumb code": ("((start & THUMB_BIT) != 0u) &&", ""),
     "start in the part": ("header->length - IMAGE_VECTORS_OFFSET);", "place->length);"),
     "calibration layout": ("(header->calibration_layout != application->calibration_layout) ||", ""),
-    "calibration length": ("||\n        (header->length != application->calibration_length)", ""),
+    "calibration length": ("||\n        (header->calibration_length != application->calibration_length)", ""),
+    "end of the tables": ("(header->length == sizeof *header + used_length(calibration)) &&", ""),
     "firmware version": ("if (header->firmware_version != application->firmware_version)", "if (false)"),
     "model": ("(calibration->model_hash == header->model_hash) &&", ""),
     "preset": ("&&\n            (calibration->preset_hash == header->preset_hash)", ""),

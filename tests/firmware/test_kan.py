@@ -100,11 +100,11 @@ def test_first_knots_that_inputs_reach_beyond_are_refused(edge: int, end: int, b
     block = ffi.new("bms_calibration_t *", lib.host_default_calibration()[0])
     kan = block.kan
     assert lib.kan_model_is_valid(ffi.addressof(kan))
-    knots = kan.cells + 1
-    at = edge * knots + (0 if end == 0 else kan.cells)
-    kan.knots[at] += by
+    numbers = kan.cells + 1 + 8 * kan.cells
+    at = edge * numbers + (0 if end == 0 else kan.cells)
+    kan.tables[at] += by
     assert not lib.kan_model_is_valid(ffi.addressof(kan))
-    kan.knots[at] -= 2 * by
+    kan.tables[at] -= 2 * by
     assert lib.kan_model_is_valid(ffi.addressof(kan))
     kan.input_reach += 0.01
     assert not lib.kan_model_is_valid(ffi.addressof(kan))

@@ -19,7 +19,7 @@ def native(tmp_path_factory: pytest.TempPathFactory) -> Native:
         tmp_path_factory.mktemp("monitor"),
         sources,
         ["include/monitor.h"],
-        extra="extern const fault_policy_t MONITOR_POLICY[20];",
+        extra="extern const fault_policy_t MONITOR_POLICY[21];",
     )
 
 
@@ -44,7 +44,7 @@ def spread(count: int, over: int) -> list[int]:
     return [round(i * over / (count - 1)) for i in range(count)]
 
 
-def test_over_voltage_and_over_temperature_and_the_domain_do_not_come_and_go(
+def test_over_voltage_over_temperature_the_domain_and_damaged_frames_do_not_come_and_go(
     native: Native,
 ) -> None:
     lib = native[1]
@@ -53,6 +53,7 @@ def test_over_voltage_and_over_temperature_and_the_domain_do_not_come_and_go(
         lib.FAULT_OVER_VOLTAGE,
         lib.FAULT_CORE_OVER_TEMPERATURE,
         lib.FAULT_SURFACE_OVER_TEMPERATURE,
+        lib.FAULT_CORRUPTED_FRAMES,
     ]
 
 
@@ -121,7 +122,7 @@ def test_a_broken_count_is_noticed(
         sources,
         ["include/monitor.h"],
         ("monitor.c", old, new),
-        "extern const fault_policy_t MONITOR_POLICY[20];",
+        "extern const fault_policy_t MONITOR_POLICY[21];",
     )
     checks = (
         test_the_last_of_its_returns_within_the_window_latches,

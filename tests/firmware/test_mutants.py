@@ -36,6 +36,8 @@ FAULTS, ESTIMATE = "tests/firmware/test_ecu_faults.py", "tests/firmware/test_kan
 NETWORK, PROTECTION = "tests/firmware/test_supervision.py", "tests/firmware/test_e2e.py"
 PLANNED = "tests/firmware/test_planner.py"
 PLANNED_FAMILY = "tests/firmware/test_planner_family.py"
+SMOOTH = "tests/firmware/test_smooth_command.py"
+NO_NUMBER, PACE = "tests/firmware/test_no_number.py", "tests/firmware/test_pace.py"
 MARGINS = "names_the_constraint"
 
 MUTANTS = [
@@ -44,10 +46,13 @@ MUTANTS = [
     Mutant("surface margin counts", "rcbf.c", " + k->surface_margin_K_per_s2)", ")", DECISION, MARGINS),
     Mutant("estimation error is taken at its worst", "rcbf.c", "f->mean.constant + f->rest", "f->mean.constant - f->rest", DECISION, MARGINS),
     Mutant("temperatures are finer than float32", "rcbf.c", " + (a.low_K - b.low_K)", "", DECISION, "slsqp or osqp"),
-    Mutant("voltage limit decides", "rcbf.c", "k->max_voltage_V - rcbf_open_circuit", "k->max_voltage_V + rcbf_open_circuit", DECISION, MARGINS),
+    Mutant("voltage limit decides", "rcbf.c", "k->max_voltage_V - open_circuit", "k->max_voltage_V + open_circuit", DECISION, MARGINS),
     Mutant("an empty interval gives 0 A", "rcbf.c", "decision.feasible ? interval.lower_A : 0.0f", "interval.lower_A", DECISION, "infeasible"),
     Mutant("a constraint that may decide is solved", "rcbf.c", "#define CLEARLY 1e-5f", "#define CLEARLY -1e-2f", DECISION, "just_decides"),
     Mutant("not a number is refused", "rcbf.c", "if (!is_physical(input))", "if (input->reference_current_A > 0.0f)", DECISION, "no_number"),
+    Mutant("an end that is no number leaves nothing", "rcbf.c", "if (!(lower_A <= to->lower_A))", "if (lower_A > to->lower_A)", NO_NUMBER),
+    Mutant("an end that is no number stays", "rcbf.c", "(lower_A <= FLT_MAX) ? lower_A : FLT_MAX", "lower_A", NO_NUMBER),
+    Mutant("steps are held against the measurements", "pace.c", "((int32_t)measured_periods - 1)", "0", PACE, "one_more"),
     Mutant("extrapolation is flagged", "kan.c", "in_domain = false;", "in_domain = true;", ESTIMATE, "flagged"),
     Mutant("combinations never seen are flagged", "kan.c", "!is_in_slabs(model, nodes)", "false", ESTIMATE, "combination"),
     Mutant("filters are trusted only when settled", "history.c", "history->periods >= model->settling_periods", "history->periods >= 0u", HISTORY, "init_until"),
@@ -73,18 +78,23 @@ MUTANTS = [
     Mutant("a reading not available keeps its own name", "bms.c", "!monitor_stops(symptoms) && is_charging(bms)", "is_charging(bms)", FAULTS, "is_named"),
     Mutant("codes do not wrap", "codec.c", "(value < all_ones) ? value : all_ones", "value", "tests/firmware/test_codec_messages.py", "reads_back"),
     Mutant("the reference has a ceiling", "bms.c", "(grown_A < strongest_A) ? strongest_A :", "", STATES, "reference"),
-    Mutant("growth is limited", "bms.c", "(asked_A < allowed_A) ? allowed_A", "(asked_A < strongest_A) ? strongest_A", STATES, "grows"),
+    Mutant("growth is limited", "bms.c", "bms->command_A - bms->growth_A", "bms->command_A - 99.0f", STATES, "grows"),
+    Mutant("a weaker request is obeyed at once", "bms.c", "numeric_larger(planned_A, asked_A)", "planned_A", STATES, "at_once"),
+    Mutant("current rises slowly after a limit", "bms.c", "= LEAST_GROWTH * most_A", "= most_A", SMOOTH, "rises_slowly"),
+    Mutant("a steadied condition is no more than the reading's", "rcbf.c", "if (!(*kept <= f->constant))", "if (!(*kept <= f->constant + margin))", SMOOTH, "no_stronger"),
+    Mutant("a steadied condition gives way after no number", "rcbf.c", "if (!(*kept <= f->constant))", "if (*kept > f->constant)", SMOOTH, "no_number"),
+    Mutant("a steadied voltage is no less than the reading", "family_observer.c", "if (!(steady_V >= read_V))", "if (steady_V != steady_V)", SMOOTH, "believes_no_less"),
     Mutant("a charge needs the edge", "bms.c", "bms->may_start && (symptoms", "(symptoms", STATES, "edge"),
     Mutant("a charge ends when complete", "bms.c", "bms->state = BMS_COMPLETE;", "bms->state = BMS_CHARGING;", STATES, "complete"),
     Mutant("the command is counted too", "soc.c", "? state->commanded.soc", "? state->measured.soc", STATES, "counted"),
-    Mutant("a fault outlives its symptom", "monitor.c", "monitor->latched |= (uint32_t)1u << fault;", "monitor->latched = (uint32_t)1u << fault & monitor->active;", FAULTS, "whatever_other"),
+    Mutant("a fault outlives its symptom", "monitor.c", "monitor->latched |= BIT(fault);", "monitor->latched = BIT(fault) & monitor->active;", FAULTS, "whatever_other"),
     Mutant("commands are rounded towards zero", "codec.c", "(rounding == CODEC_TOWARDS_ZERO) ? STEP_TOLERANCE : 0.5f", "0.5f", "tests/firmware/test_codec.py", "towards_zero"),
     Mutant("a plan only weakens", "planner.c", "((planned_A > reference_A) && (planned_A <= 0.0f))", "(planned_A <= 0.0f)", PLANNED, "never_more"),
     Mutant("a plan asks for no discharge", "planner.c", " && (planned_A <= 0.0f))", ")", PLANNED, "never_more"),
     Mutant("a plan needs numbers", "planner.c", "if (!is_known(&planner->start, &planner->goal))", "if (planner->goal.strongest_A < 0.0f)", PLANNED, "no_number"),
     Mutant("a period's steps are bounded", "planner.c", " && (i < PLANNER_STEPS); i++", "; i++", PLANNED, "takes_no_more"),
     Mutant("the better half is searched on", "planner.c", "inner[0].cost < inner[1].cost", "inner[0].cost > inner[1].cost", PLANNED, "near_the_bound"),
-    Mutant("limits are ridden in the prediction", "planner.c", "weaker(soc_A, weaker(core_A, surface_A))", "soc_A", PLANNED, "comes_true"),
+    Mutant("limits are ridden in the prediction", "planner.c", "numeric_smaller(soc_A, numeric_smaller(core_A, surface_A))", "soc_A", PLANNED, "comes_true"),
     Mutant("the coolant warms up", "planner.c", "row[COOLANT] * planner->temperature_K[COOLANT] +", "row[COOLANT] * planner->start.temperature_K[COOLANT] +", PLANNED, "comes_true or near_the_bound"),
     Mutant("in time is better than soon", "planner.c", "(candidate->strength_A + IN_TIME)", "(IN_TIME - candidate->strength_A)", PLANNED, "by_time"),
     Mutant("the fixed mode is not planned", "bms_plan.c", "((mode == MODE_FASTEST) || (mode == MODE_BY_TIME))", "(mode <= MODE_FIXED)", "tests/firmware/test_charge_mode.py", "fixed"),

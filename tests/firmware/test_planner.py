@@ -24,11 +24,11 @@ PAPER, LIN = "paper_calibrated", "lin2014"
 # Preset, start, lower bound on the time of every controller (s; a convex programme with the true
 # states, without ramp and margins), and shares of it and of the fixed reference's time.
 STARTS = [
-    pytest.param(PAPER, None, 518.5, 1.065, 0.70, id="paper_calibrated from its start"),
-    pytest.param(PAPER, 303.0, 930.3, 1.13, 0.69, id="paper_calibrated from 303 K"),
-    pytest.param(PAPER, 313.0, 1421.7, 1.175, 0.865, id="paper_calibrated from 313 K"),
-    pytest.param(LIN, None, 323.8, 1.09, 1.0, id="lin2014 from its start"),
-    pytest.param(LIN, 313.0, 452.0, 1.058, 1.0, id="lin2014 from 313 K"),
+    pytest.param(PAPER, None, 518.5, 1.02, 0.86, id="paper_calibrated from its start"),
+    pytest.param(PAPER, 303.0, 930.3, 1.02, 0.72, id="paper_calibrated from 303 K"),
+    pytest.param(PAPER, 313.0, 1421.7, 1.025, 0.85, id="paper_calibrated from 313 K"),
+    pytest.param(LIN, None, 323.8, 1.02, 1.0, id="lin2014 from its start"),
+    pytest.param(LIN, 313.0, 452.0, 1.035, 1.0, id="lin2014 from 313 K"),
 ]
 
 
@@ -40,16 +40,6 @@ def test_the_fastest_charge_is_near_the_bound_and_never_slower_than_the_fixed_on
     fixed = time_s(charge(preset, start_K, Mode.FIXED))
     assert bound_s < fastest < of_bound * bound_s
     assert fastest <= of_fixed * fixed
-
-
-@pytest.mark.parametrize(
-    ("start_K", "bound_s", "of_bound"), [(None, 518.5, 1.035), (303.0, 930.3, 1.04)]
-)
-def test_the_rest_of_the_gap_is_the_reserve_of_the_paper_s_surface_condition(
-    start_K: float | None, bound_s: float, of_bound: float
-) -> None:
-    fastest = charge(PAPER, start_K, Mode.FASTEST, surface_condition="worst-case")
-    assert bound_s < time_s(fastest) < of_bound * bound_s
 
 
 def test_no_constant_reference_is_much_faster_than_the_planned_charge() -> None:

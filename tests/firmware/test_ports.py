@@ -105,7 +105,7 @@ def test_a_board_is_a_few_lines_of_make() -> None:
         assert [path.name for path in (PORTS / target).iterdir()] == ["port.mk"]
         lines = (PORTS / target / "port.mk").read_text().splitlines()
         names = {line.split(":=")[0].strip() for line in lines if ":=" in line}
-        assert names - {"CORE_FLAGS", "FAST_SOURCES"} == {"TARGET", "TARGET_ID", "CPU"}
+        assert names - {"CORE_FLAGS"} == {"TARGET", "TARGET_ID", "CPU"}
 
 
 @needs_compiler

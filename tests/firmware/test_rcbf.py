@@ -17,6 +17,8 @@ from scipy.optimize import brentq, minimize
 from bms.barrier.rounding import CONSTANT_ROUNDINGS, UNIT, rounding_allowances
 from bms.decision import Decision
 from bms.firmware import Firmware
+from bms.presets import load_preset
+from bms.presets.paper_form import in_paper_form
 from tests.firmware.constraints import NAMES, interval, quadratics, value
 
 PRESETS = ("lin2014", "paper_calibrated")
@@ -33,6 +35,12 @@ def lin2014() -> Firmware:
 @pytest.fixture(scope="module", params=PRESETS)
 def firmware(request: pytest.FixtureRequest) -> Firmware:
     return Firmware(request.param)
+
+
+@pytest.fixture(scope="module", params=PRESETS)
+def paper_firmware(request: pytest.FixtureRequest) -> Firmware:
+    """With the paper's gains, by which each of the four constraints decides often."""
+    return Firmware(in_paper_form(load_preset(request.param)))
 
 
 def random_states(seed: int, count: int) -> list[dict[str, float]]:
@@ -148,18 +156,18 @@ def test_decision_names_the_constraint_that_decides_and_reports_all_margins(
     assert {"none", "soc", "core", "infeasible"} <= seen
 
 
-def test_a_constraint_that_only_just_decides_decides_the_same(firmware: Firmware) -> None:
+def test_a_constraint_that_only_just_decides_decides_the_same(paper_firmware: Firmware) -> None:
     """Where it ends does not depend on the reference, however little that lies beyond."""
     decided = {"core": 0, "surface": 0}
     for state in random_states(7, 3_000):
-        decision = solve(firmware, state)
+        decision = solve(paper_firmware, state)
         if decision.active_constraint not in decided or decision.current_A == 0.0:
             continue
         decided[decision.active_constraint] += 1
         for steps in (1, 2, 5, 20, 100, 500, 5_000):
             # Single steps of float32 beyond the end.
             reference_A = np.float32(decision.current_A) * np.float32(1.0 + steps * 2.0**-23)
-            closer = solve(firmware, {**state, "reference_current_A": float(reference_A)})
+            closer = solve(paper_firmware, {**state, "reference_current_A": float(reference_A)})
             assert closer.current_A == decision.current_A, (state, steps)
     assert sum(decided.values()) > 100
 
@@ -193,15 +201,15 @@ def tight_states(firmware: Firmware, name: str, count: int) -> Iterator[dict[str
 
 
 @pytest.mark.parametrize("name", ["core", "surface"])
-def test_float32_never_takes_more_than_its_allowance(firmware: Firmware, name: str) -> None:
-    allowances = rounding_allowances(firmware.preset.cell, firmware.preset)
+def test_float32_never_takes_more_than_its_allowance(paper_firmware: Firmware, name: str) -> None:
+    allowances = rounding_allowances(paper_firmware.preset.cell, paper_firmware.preset)
     decided = 0
-    for state in tight_states(firmware, name, 1_500):
-        decision = solve(firmware, state)
+    for state in tight_states(paper_firmware, name, 1_500):
+        decision = solve(paper_firmware, state)
         if decision.current_A == 0.0:
             continue
         decided += decision.active_constraint == name
-        groups = quadratics(firmware.parameters, state)
+        groups = quadratics(paper_firmware.parameters, state)
         for other in ("core", "surface"):
             sides, allowance = groups[NAMES.index(other)], allowances[NAMES.index(other)]
             assert min(value(q, decision.current_A) for q in sides) >= -allowance, state
@@ -210,9 +218,9 @@ def test_float32_never_takes_more_than_its_allowance(firmware: Firmware, name: s
 
 @pytest.mark.parametrize("name", ["voltage", "soc"])
 def test_float32_never_takes_more_than_its_electrical_allowance(
-    firmware: Firmware, name: str
+    paper_firmware: Firmware, name: str
 ) -> None:
-    preset = firmware.preset
+    preset = paper_firmware.preset
     group, ocv = NAMES.index(name), preset.cell.ocv
     allowance = rounding_allowances(preset.cell, preset)[group]
     if name == "voltage":
@@ -223,11 +231,11 @@ def test_float32_never_takes_more_than_its_electrical_allowance(
     decided = 0
     for soc in random.uniform(0.8, preset.limits.max_soc, 3_000).astype(np.float32):
         state = {**COLD, "soc": float(soc)}
-        decision = solve(firmware, state)
+        decision = solve(paper_firmware, state)
         if decision.active_constraint != name:
             continue
         decided += 1
-        (side,) = quadratics(firmware.parameters, state)[group]
+        (side,) = quadratics(paper_firmware.parameters, state)[group]
         assert abs(value(side, decision.current_A)) <= allowance, state
     assert decided > 300
 

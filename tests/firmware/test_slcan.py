@@ -124,6 +124,8 @@ def test_frames_of_other_kinds_are_ignored(line: Line, text: bytes) -> None:
             b"tG001AA\r",
             b"t1001AG\r",
             b"hello\r",
+            b"t8000\r",
+            b"tFFF0\r",
             b"t" * 40 + b"\r",
             b"O" * 27 + b"\r",
         ),

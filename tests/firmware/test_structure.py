@@ -34,7 +34,7 @@ def test_no_warning(compiler: str, source: Path) -> None:
         ("bms.h", "BMS_DERATED = 3", "BMS_DERATED = 6"),
         ("codec.h", "REQUEST_CHARGE = 1", "REQUEST_CHARGE = 2"),
         ("rcbf.h", "RCBF_INVALID = 6", "RCBF_INVALID = 7"),
-        ("monitor.h", "FAULT_SURFACE_DEFICIT = 19", "FAULT_SURFACE_DEFICIT = 20"),
+        ("monitor.h", "FAULT_OUT_OF_STEP = 20", "FAULT_OUT_OF_STEP = 21"),
         ("monitor.h", "FAULT_NONE 255", "FAULT_NONE 254"),
         ("e2e.h", "E2E_VALID = 2, E2E_INVALID = 3", "E2E_VALID = 3, E2E_INVALID = 2"),
     ],

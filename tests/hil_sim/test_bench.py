@@ -12,15 +12,21 @@ import numpy as np
 import pytest
 
 from bms.cell import CellState, integrate_step
+from bms.image import TARGETS
 from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.faults import load_faults
 from hil_sim.run.settings import Settings
 from hil_sim.studies.bench import simulation
+from hil_sim.studies.bench.aims import aims
+from hil_sim.studies.bench.board import BoardCost, board_costs
 from hil_sim.studies.bench.generated_solver import GENERATED
 from hil_sim.studies.bench.layers import sampled
+from hil_sim.studies.bench.machine import this_machine
 from hil_sim.studies.bench.problem import charge_problem
 from hil_sim.studies.bench.race import Absent, Clocks, Peer, Quartiles, WrongAnswerError, race
-from hil_sim.studies.bench.simulation import bus_speed
+from hil_sim.studies.bench.run import Result
+from hil_sim.studies.bench.simulation import BusSpeed, bus_speed
+from hil_sim.studies.bench.throughput import Throughput
 from tests.firmware.constraints import interval, quadratics
 
 RIGHT = np.array([1.0, 2.0, 3.0, 4.0])
@@ -113,9 +119,11 @@ def test_every_way_to_the_same_answer_is_compared_timed_and_named(bms):
     (period,) = result["period"]
     assert period["answers_a_repetition"] >= result["states"] > 7000
     both_ns = rows["KAN in C"]["median_time_ns"] + rows["closed form in C"]["median_time_ns"]
-    (aim,) = (aim for aim in result["aims"] if aim["unit"] == "ns")
+    in_time = {aim["name"]: aim for aim in result["aims"] if aim["unit"] == "ns"}
+    aim = in_time["estimate plus decision in C"]
     assert aim["measured"] == both_ns
     assert aim["is_reached"] == (both_ns <= 100.0)
+    assert in_time["control period with frames in C"]["measured"] == period["median_time_ns"]
     assert result["simulation"] == result["campaign"] == []
 
 
@@ -196,7 +204,7 @@ def test_speed_leaves_out_the_time_before_the_first_answer():
     wall = iter([10_000_000_000, *range(11_000_000_000, 99_000_000_000, 10_000_000)])
     cpu = iter([3_000_000_000, 3_000_000_000 + 285_000_000, 0, 0])
     clocks = Clocks(wall.__next__, cpu.__next__)
-    speed = bus_speed("virtual:bench-clock", DEFAULT_PRESET, 1.0, 1, clocks)
+    speed = bus_speed("virtual:bench-clock", DEFAULT_PRESET, 1.0, 1, clocks, 1)
     periods = speed.periods
     measured_s = 1.0 + (periods - 2) * 0.01
     assert speed.times_real_time.median == pytest.approx((periods - 1) * 0.1 / measured_s)
@@ -209,7 +217,7 @@ def test_a_charge_that_fails_has_no_speed(monkeypatch, tmp_path):
     faulty = partial(Settings, faults=load_faults(path))
     monkeypatch.setattr(simulation, "Settings", faulty)
     clocks = Clocks(time.perf_counter_ns, time.process_time_ns)
-    speed = bus_speed("virtual:bench-failure", DEFAULT_PRESET, 100.0, 1, clocks)
+    speed = bus_speed("virtual:bench-failure", DEFAULT_PRESET, 100.0, 1, clocks, 1)
     assert speed.times_real_time is None
     assert speed.not_run.startswith("charge failed: ")
 
@@ -225,7 +233,7 @@ def test_a_layer_is_charged_with_what_happens_below_it():
 
 def test_without_the_guest_a_socketcan_bus_is_not_run(monkeypatch, tmp_path):
     monkeypatch.setattr(simulation, "GUEST", tmp_path / "vcan_guest.sh")
-    speed = bus_speed("socketcan:nothere0", DEFAULT_PRESET, 1.0, 1, Clocks(int, int))
+    speed = bus_speed("socketcan:nothere0", DEFAULT_PRESET, 1.0, 1, Clocks(int, int), 2)
     assert speed.times_real_time is None
     assert "no vcan_guest.sh" in speed.not_run
 
@@ -255,6 +263,7 @@ def test_the_guest_runs_the_same_and_answers_in_json():
             DEFAULT_PRESET,
             "1.0",
             "2",
+            "1",
         ],
         capture_output=True,
         text=True,
@@ -262,4 +271,48 @@ def test_the_guest_runs_the_same_and_answers_in_json():
     )
     speed = json.loads(done.stdout)
     assert speed["bus"] == "virtual:guest"
+    assert speed["parties"] == "one process"
     assert speed["times_real_time"]["repetitions"] == 2
+
+
+MEASURED = BoardCost("mps2-an386", 1000, 4001, 16 * 1024, 32 * 1024 + 1)
+
+
+def speed_of(bus, processes, times):
+    return BusSpeed(bus, processes, "parties", 10, Quartiles(times, times, times, 3), 100.0, {})
+
+
+def test_an_aim_is_reached_on_its_bound_and_missed_beyond_it():
+    """Instructions, bytes and ns are to be small, multiples and runs large."""
+    result = Result(
+        this_machine(),
+        simulation=[
+            speed_of("virtual:x", 1, 1000.0),
+            speed_of("socketcan:vcan0", 1, 24.9),
+            speed_of("socketcan:vcan0", 2, 15.0),
+            speed_of("udp_multicast:1", 2, 1.0),
+        ],
+        campaign=[Throughput(100, 2, 1.0, 100.0), Throughput(1000, 2, 4.0, 260.0)],
+        board=[MEASURED, BoardCost("mps2-an385", None, None, None, None, "not built")],
+    )
+    found = {aim.name: (aim.measured, aim.is_reached) for aim in aims(result)}
+    assert found == {
+        "simulation on virtual:x, parties": (1000.0, True),
+        "simulation on socketcan:vcan0, parties": (15.0, True),
+        "campaign, runs a second and core": (130.0, True),
+        "estimate and decision, worst of a charge on mps2-an386": (1000, True),
+        "control period with frames, median on mps2-an386": (4001, False),
+        "flash of the application on mps2-an386": (16 * 1024, True),
+        "flash of the image on mps2-an386": (32 * 1024 + 1, False),
+    }
+    assert [aim.is_reached for aim in aims(result)][1] is False
+
+
+def test_a_board_whose_program_is_not_built_is_named_with_the_remedy(monkeypatch, tmp_path):
+    monkeypatch.setattr("hil_sim.studies.bench.board.built_folder", lambda board: tmp_path)
+    costs = board_costs(DEFAULT_PRESET)
+    assert [cost.board for cost in costs] == list(TARGETS)
+    for cost in costs:
+        assert cost.period_median is None
+        assert "make" in cost.not_run
+        assert cost.image_flash_B > cost.application_flash_B > 0

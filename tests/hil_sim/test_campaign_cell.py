@@ -17,8 +17,8 @@ from bms.cell import (
     terminal_voltage_V,
 )
 from bms.presets import load_preset
-from hil_sim.studies.campaign._runner import ffi, lib
-from hil_sim.studies.campaign.native_cell import cell_fields
+from hil_sim.native._native import ffi, lib
+from hil_sim.native.cell_fields import cell_fields
 
 STEP_S = 0.01
 PLAIN = load_preset("lin2014").cell

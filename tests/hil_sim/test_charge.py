@@ -8,6 +8,7 @@ from bms.errors import BusError, ModelMismatchError
 from bms.firmware import Ecu
 from bms.model.model_file import shipped_model_path
 from bms.presets import load_preset
+from hil_sim.bus.catalog import Mode
 from hil_sim.logs.recorder import Recorder
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.session import run_both
@@ -52,7 +53,7 @@ def test_a_model_that_remembers_keeps_every_limit_and_charges_faster(preset, dis
 
 def test_limits_that_the_firmware_does_not_keep_are_seen(preset):
     result = run_both(
-        Settings(preset, max_time_s=300.0),
+        Settings(preset, mode=Mode.FIXED, max_time_s=400.0),
         ecu_factory=lambda plant, database: HotterThanAllowed(preset, excess_K=5.0),
     )
     assert not result.summary.limits_kept
@@ -186,7 +187,7 @@ def test_a_time_limit_ends_the_run_and_counts_from_the_start_of_the_charge(prese
 
 
 def test_series_agree_with_the_summary(preset):
-    result = run_both(Settings(preset, max_time_s=200.0))
+    result = run_both(Settings(preset, mode=Mode.FIXED, max_time_s=250.0))
     summary, series = result.summary, result.series
     assert len(series.time_s) == summary.steps
     assert series.time_s[5] == 0.0

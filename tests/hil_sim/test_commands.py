@@ -52,7 +52,7 @@ def test_a_charge_whose_time_ends_first_is_not_done_and_says_how_full_it_is(opti
     assert done.returncode == 1
     (line,) = done.stderr.splitlines()
     assert re.fullmatch(
-        r"bms: kan-rcbf: time ended before the charge: state of charge \d+\.\d\d %; "
+        r"bms: kan-rcbf-fastest: time ended before the charge: state of charge \d+\.\d\d %; "
         r"see --max-time-s",
         line,
     )

@@ -25,6 +25,7 @@ EXAMPLES = {
     "message-wrong-id": 'message = "Coolant"\nframe_id = 0x7FF',
     "message-wrong-length": 'message = "Coolant"\nlength = 3',
     "message-masqueraded": 'message = "Coolant"',
+    "message-contested": 'message = "Coolant"\nsignal = "CoolingPower"\nvalue = 3.0',
     "bus-off": "for_s = 2",
     "bus-flood": 'position = "after"',
     "sensor-stuck": 'sensor = "voltage_V"',
@@ -109,6 +110,14 @@ REFUSED = [
     (table("message-wrong-length", 'message = "Coolant"\nlength = 4'), "length"),
     (table("message-wrong-length", 'message = "Coolant"\nlength = 9'), "length"),
     (table("message-masqueraded", 'message = "Identity"'), "protected"),
+    (
+        table("message-contested", 'message = "Coolant"\nsignal = "Voltage"\nvalue = 3.0'),
+        "CoolingPower",
+    ),
+    (
+        table("message-contested", 'message = "Identity"\nsignal = "ModelHash"\nvalue = 3.0'),
+        "protected",
+    ),
     (table("message-delayed", 'message = "Coolant"\ndelay_periods = 0'), "delay_periods"),
     (table("sensor-stuck", 'sensor = "core_temperature_K"'), "voltage_V"),
     (table("sensor-drifting", 'sensor = "voltage_V"\nrate_per_s = inf'), "rate_per_s"),

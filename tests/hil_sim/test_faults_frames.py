@@ -67,6 +67,7 @@ KINDS_OF_COOLANT = [
     {"kind": "message-wrong-id", "frame_id": 0x7FF},
     {"kind": "message-wrong-length", "length": 3},
     {"kind": "message-masqueraded"},
+    {"kind": "message-contested", "signal": "CoolingPower", "value": 3.0},
 ]
 
 
@@ -148,6 +149,23 @@ def test_a_masquerader_sends_new_content_under_a_valid_crc_with_the_last_counter
         assert values["CoolantCounter"] == FROM - 1
         assert values["CoolingPower"] == pytest.approx(0.1 * period)
         assert autosar.compute_profile2_crc(data, ids[FROM - 1]) == data[0]
+
+
+@pytest.mark.parametrize(("position", "steps"), [("ahead", 0), ("behind", 1)])
+def test_who_contests_a_message_sends_it_beside_the_true_one(position, steps):
+    line = played(kind="message-contested", signal="CoolingPower", value=3.0, position=position)
+    message = ORACLE.get_message_by_name("Coolant")
+    ids = bytes.fromhex(message.dbc.attributes["E2EProfile2DataIdList"].value)
+    for period in range(FROM, UNTIL):
+        both = [f for f in line.arrived[period] if f.frame_id == message.frame_id]
+        true = next(f for f in line.sent[period] if f.frame_id == message.frame_id)
+        other = both[1] if position == "behind" else both[0]
+        assert both == ([true, other] if position == "behind" else [other, true])
+        values = message.decode(other.data, decode_choices=False)
+        counter = (period + steps) % 16
+        assert values["CoolantCounter"] == counter
+        assert values["CoolingPower"] == pytest.approx(3.0)
+        assert autosar.compute_profile2_crc(other.data, ids[counter]) == other.data[0]
 
 
 def test_a_bus_that_is_off_carries_sync_alone_in_both_directions():

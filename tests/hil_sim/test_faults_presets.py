@@ -90,14 +90,14 @@ def test_default_preset_meets_every_need():
 
 @pytest.mark.parametrize(
     ("start", "temperature_K", "onset"),
-    [("warm", 303.0, 90), ("growing", 300.0, 50)],
+    [("warm", 303.0, 90), ("growing", 300.0, 23)],
 )
 def test_start_follows_the_preset(start, temperature_K, onset):
     row = named({"warm": "surface sensor biased cold", "growing": "current sensor sticks"}[start])
     assert row.start.initial(COOL.preset).temperature_K == temperature_K
     assert row.start.onset(COOL.preset) == onset
-    # Half of 6 A, growing by 0.23 A a period.
-    assert row.start.onset(WEAK.preset) == {"warm": 90, "growing": 13}[start]
+    # Half of 6 A, growing by 0.5 A a period.
+    assert row.start.onset(WEAK.preset) == {"warm": 90, "growing": 6}[start]
     assert row.follow(WEAK.preset).fault.from_period == row.start.onset(WEAK.preset)
 
 

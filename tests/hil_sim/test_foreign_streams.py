@@ -76,17 +76,19 @@ def test_a_flood_faster_than_it_can_be_read_ends_a_wait_too():
     assert CanBus("endless", endless, clock_s=lambda: endless.time_s).receive(0.0) is None
 
 
-class Talk:
-    """A bus on which a data frame of somebody else comes every GAP_S, without end."""
+class EndlessTalk:
+    """A bus of python-can on which a data frame of somebody else comes every GAP_S."""
 
-    name = "talk"
-
-    def receive(self, timeout_s):
+    def recv(self, timeout_s):
         time.sleep(min(timeout_s, GAP_S))
-        return Frame(0x7FF, b"") if timeout_s >= GAP_S else None
+        return MESSAGES["other"] if timeout_s >= GAP_S else None
 
-    def send(self, frame):
+    def send(self, message):
         pass
+
+
+def Talk():
+    return CanBus("talk", EndlessTalk())
 
 
 @pytest.mark.parametrize(

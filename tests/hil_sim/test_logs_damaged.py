@@ -171,3 +171,17 @@ def test_damaged_log_is_cut_into_periods_or_refused(tmp_path_factory, intact, da
     path = tmp_path_factory.getbasetemp() / "cut.log"
     path.write_bytes(damaged(intact[".log"]))
     assert_read_or_refused(load_recording, path)
+
+
+@pytest.mark.parametrize("name", ["long.log", "long.log.gz"])
+def test_a_log_without_end_is_refused_before_it_fills_the_memory(tmp_path, monkeypatch, name):
+    """Lines that repeat compress a thousandfold, so that the size of the file says nothing."""
+    monkeypatch.setattr("hil_sim.logs.reader.MOST_ENTRIES", 10)
+    path = tmp_path / name
+    write = gzip.open if name.endswith(".gz") else open
+    for lines in (10, 11):
+        with write(path, "wt") as file:
+            file.write("".join(LINE.format(n) for n in range(lines)))
+        if lines == 10:
+            assert len(list(read_log(path))) == 10
+    assert "more than 10 entries" in refusal(path)

@@ -15,6 +15,7 @@ from hil_sim.plant.sensors import Readings
 
 READINGS = Readings(-1.0, 3.3, 300.0, 299.0, 1.0)
 PERIODS_TO_TRUST = 3
+WINDOW_PERIODS = 5
 REQUEST = Request(charge=False, reference_current_A=-23.0, plug_in_soc=0.1)
 
 
@@ -125,8 +126,10 @@ def test_a_damaged_command_from_elsewhere_does_not_end_the_answer(database):
 
 
 @pytest.mark.parametrize("every", [1, 3, 4])
-def test_a_masquerade_with_a_frozen_counter_does_not_make_commands_late(database, every):
-    """Where the frozen counter is one of the next three it is obeyed: profile 2 cannot tell."""
+def test_a_masquerade_with_a_frozen_counter_neither_makes_commands_late_nor_is_obeyed(
+    database, every
+):
+    """Where the frozen counter is one of the next three it is in sequence; so is the true one."""
     codec = database["ChargeCommand"]
     frozen = Frame(codec.frame_id, codec.encode({"CommandCurrent": -20.0}, PERIODS_TO_TRUST - 1))
 
@@ -141,10 +144,64 @@ def test_a_masquerade_with_a_frozen_counter_does_not_make_commands_late(database
     own = sum(
         command_A == pytest.approx(-0.1 * period) for period, command_A in enumerate(commands_A, 1)
     )
-    taken = commands_A.count(pytest.approx(-20.0))
-    assert taken <= 3 * 64 / COUNTER_MODULUS
-    assert own + taken + commands_A.count(None) == 64
-    assert own >= 40
+    assert own + commands_A.count(0.0) + commands_A.count(None) == 64
+    assert own >= 64 - 8 * 64 / COUNTER_MODULUS, "a contradiction ends with its window"
+
+
+@pytest.mark.parametrize("place", ["ahead", "behind"])
+@pytest.mark.parametrize("steps_ahead", [0, 1, 2, 3])
+@pytest.mark.parametrize("pattern", [(1,), (1, 0), (1, 1, 0)])
+@pytest.mark.parametrize("own_A", [0.0, -2.0])
+def test_a_command_of_somebody_else_never_makes_the_charger_stronger(
+    database, place, steps_ahead, pattern, own_A
+):
+    """It has a running counter and the right CRC; what the ECU says meanwhile still holds."""
+    codec = database["ChargeCommand"]
+
+    def foreign(wire):
+        period = len(wire.heard) - 1
+        if pattern[period % len(pattern)]:
+            counter = (PERIODS_TO_TRUST + period + steps_ahead) % COUNTER_MODULUS
+            data = codec.encode({"CommandCurrent": -23.0, "CommandState": 2}, counter)
+            wire.far.send(Frame(codec.frame_id, data))
+
+    def serve(wire):
+        if place == "ahead":
+            foreign(wire)
+        wire.command(own_A)
+        if place == "behind":
+            foreign(wire)
+
+    with Wire(f"virtual:rival {place} {steps_ahead}", database, serve) as wire:
+        wire.trusted()
+        usable_A = [wire.exchange().usable_command_A for _ in range(30)]
+    assert min(command_A for command_A in usable_A if command_A is not None) >= own_A - 1e-6
+    if pattern == (1,):
+        assert usable_A[4:] == [0.0] * 26, "contradiction stops the charger"
+
+
+@pytest.mark.parametrize("ahead", [0, 1], ids=["before the ECU's own", "after it, for the next"])
+def test_after_one_command_that_passes_for_the_ecus_the_next_are_those_of_their_own_periods(
+    database, ahead
+):
+    """It stops the charger for a window of periods, is never obeyed, and delays none."""
+    codec = database["ChargeCommand"]
+
+    def serve(wire):
+        period = len(wire.heard)
+        counter = (PERIODS_TO_TRUST + period - 1 + ahead) % COUNTER_MODULUS
+        forged = Frame(codec.frame_id, codec.encode({"CommandCurrent": -20.0}, counter))
+        own = wire._command.frame({"CommandCurrent": -0.1 * period})
+        both = [own, forged] if ahead else [forged, own]
+        wire.far.send(*(both if period == 2 else [own]))
+
+    with Wire("virtual:forged", database, serve) as wire:
+        wire.trusted()
+        commands_A = [wire.exchange().usable_command_A for _ in range(20)]
+    expected_A = [-0.1 * period for period in range(1, 21)]
+    contested = slice(1 + ahead, 1 + ahead + WINDOW_PERIODS)
+    expected_A[contested] = [0.0] * WINDOW_PERIODS
+    assert commands_A == pytest.approx(expected_A)
 
 
 def test_an_ecu_that_restarts_is_followed_after_one_wait(database):

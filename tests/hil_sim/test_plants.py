@@ -93,7 +93,8 @@ def test_the_disturbance_warms_the_masses_as_it_warms_the_two_mass_plant(preset)
     for _ in range(100):
         masses.advance(0.0, preset.initial.soc, plant.cooling_power_W, plant.extremes)
         plant.advance()
-    assert masses.state == plant.state
+    # Of one a Runge-Kutta step, of the other the exact one: tests/hil_sim/test_campaign_cell.py.
+    assert np.abs(np.subtract(masses.state, plant.state)).max() < 2e-9
 
 
 def test_with_the_resistance_of_the_preset_a_recorded_plant_is_the_two_mass_plant(preset):

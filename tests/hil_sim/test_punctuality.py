@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil_sim.bus.buses import Frame
+from hil_sim.bus.buses import CanBus, Frame
 from hil_sim.bus.e2e import Sender
 from hil_sim.nodes.ecu import MEASUREMENT_ID, PHASE_PERIODS, EcuNode
 from hil_sim.nodes.plant import PlantNode, Request
@@ -37,20 +37,20 @@ class FaultyClock:
         self.time_s = max(self.time_s, time_s) + next(self._oversleep_s, 0.0)
 
 
-class TimedBus:
+class TimedBus(CanBus):
     """Frames that arrive at given times of a clock; waiting for one lets the time pass."""
 
-    name = "timed"
-
     def __init__(self, clock):
+        super().__init__("timed", None, clock.now_s)
         self._clock = clock
         self.coming = []
         self.sent = []
         self.answer = lambda frame: None
 
-    def send(self, frame):
-        self.sent.append((self._clock.time_s, frame))
-        self.answer(frame)
+    def send(self, *frames):
+        for frame in frames:
+            self.sent.append((self._clock.time_s, frame))
+            self.answer(frame)
 
     def receive(self, timeout_s):
         end_s = self._clock.time_s + timeout_s

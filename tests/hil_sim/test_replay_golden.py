@@ -21,7 +21,7 @@ STATES = {
     "lin2014_hot": ["Init", "Standby", "Charging", "Derated"],
     "cold_start": ["Init", "Standby", "Charging"],
     "hot_derating": ["Init", "Standby", "Charging", "Derated"],
-    "lagged_model": ["Init", "Standby", "Charging", "Derated", "Charging"],
+    "lagged_model": ["Init", "Standby", *["Charging", "Derated"] * 3],
     "message_loss": ["Init", "Standby", "Charging", "Fault", "Standby", "Charging"],
     "corrupted_frames": ["Init", "Standby", "Charging", "Fault", "Standby", "Charging"],
     "sensor_fault": [

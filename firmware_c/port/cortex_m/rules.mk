@@ -1,6 +1,5 @@
 # Rules of every microcontroller port: boot stage, application and calibration as one image.
-# A port sets TARGET, TARGET_ID and CPU; it may set CORE_FLAGS, and FAST_SOURCES, those of the core
-# that are made for speed. Run from the repository's root.
+# A port sets TARGET, TARGET_ID and CPU; it may set CORE_FLAGS. Run from the repository's root.
 BUILD ?= build/firmware/$(TARGET)
 PYTHON ?= .venv/bin/python
 CROSS ?= arm-none-eabi-
@@ -28,10 +27,11 @@ LDFLAGS := $(CPU) -mthumb -nostartfiles --specs=nano.specs -L$F/linker \
 
 CORE_SOURCES := $(wildcard $F/src/*.c $F/generated/can_*.c)
 APPLICATION_SOURCES := $(CORE_SOURCES) $F/generated/calibration_default.c $(wildcard $F/port/*.c) \
-  $(addprefix $F/port/cortex_m/, startup.c port.c main.c application_header.c calibration_header.c)
-BOOT_SOURCES := $F/src/codec.c $F/src/e2e.c $F/generated/can_catalog.c $F/generated/can_db.c \
+  $(addprefix $F/port/cortex_m/, startup.c memory.c port.c main.c \
+  application_header.c calibration_header.c)
+BOOT_SOURCES := $F/src/e2e.c $F/src/kan.c $F/generated/can_catalog.c $F/generated/can_db.c \
   $(wildcard $F/image/*.c $F/boot/*.c) $F/port/slcan.c \
-  $(addprefix $F/port/cortex_m/, startup.c boot.c)
+  $(addprefix $F/port/cortex_m/, startup.c memory.c boot.c)
 APPLICATION_OBJECTS := $(APPLICATION_SOURCES:%.c=$(BUILD)/application/%.o)
 CORE_OBJECTS := $(CORE_SOURCES:%.c=$(BUILD)/application/%.o)
 BOOT_OBJECTS := $(BOOT_SOURCES:%.c=$(BUILD)/boot/%.o)
@@ -51,11 +51,23 @@ $(BUILD)/sizes.o: $(wildcard $F/include/*.h)
 	  $(CROSS)gcc $(CFLAGS) -x c -c - -o $@
 
 $(CORE_OBJECTS): CFLAGS += $(WHOLE) $(CORE_FLAGS)
-$(FAST_SOURCES:%=$(BUILD)/application/$F/src/%.o): CFLAGS += -O2
+# Its loops are not to become calls of the functions that they are.
+$(BUILD)/%/port/cortex_m/memory.o: CFLAGS += -fno-tree-loop-distribute-patterns -ffreestanding
 
 $(BUILD)/application/%.o: %.c $(RULES)
 	@mkdir -p $(@D)
 	@$(CROSS)gcc $(CFLAGS) -c $< -o $@
+
+# Tables end with the model: what would follow them is cut off, and left to larger models.
+CALIBRATION := $(BUILD)/application/$F/generated/calibration_default.o
+CALIBRATION_SECTION := .rodata.BMS_DEFAULT_CALIBRATION
+
+$(CALIBRATION): $F/generated/calibration_default.c $(RULES)
+	@mkdir -p $(@D)
+	@$(CROSS)gcc $(CFLAGS) -c $< -o $@
+	@$(CROSS)objcopy -O binary -j $(CALIBRATION_SECTION) $@ $(BUILD)/whole_calibration.bin
+	@"$(PYTHON)" -m bms.image calibration $(BUILD)/whole_calibration.bin --out $(BUILD)
+	@$(CROSS)objcopy --update-section $(CALIBRATION_SECTION)=$(BUILD)/calibration.bin $@
 
 $(BUILD)/boot/%.o: %.c $(RULES)
 	@mkdir -p $(@D)
@@ -99,7 +111,7 @@ $(BUILD)/firmware.hex: $(BUILD)/firmware.elf
 
 # Counts instructions; not part of the image.
 COST_OBJECTS := $(patsubst %.c,$(BUILD)/application/%.o, \
-  $(wildcard $F/src/*.c $F/generated/*.c $F/cost/*.c) $F/port/cortex_m/startup.c)
+  $(wildcard $F/src/*.c $F/generated/*.c $F/cost/*.c) $F/port/cortex_m/startup.c $F/port/cortex_m/memory.c)
 
 $(BUILD)/cost.elf: $(COST_OBJECTS) $F/linker/cost.ld $F/linker/ram.ld
 	@$(CROSS)gcc $(LINK_WHOLE) $(LDFLAGS) -T cost.ld $(COST_OBJECTS) -lm -o $@

@@ -12,9 +12,10 @@ INTERVAL_S = 0.001
 
 LAYERS: Mapping[str, tuple[str, ...]] = {
     "cell model": ("bms/cell/", "hil_sim/plant/plant.py", "hil_sim/plant/disturbances.py"),
-    "bus (python-can)": ("hil_sim/bus/buses.py",),
+    "bus (python-can)": ("hil_sim/bus/buses.py", "hil_sim/bus/batches.py"),
     "codec and protection of the plant": (
         "hil_sim/bus/database.py",
+        "hil_sim/bus/wire.py",
         "hil_sim/bus/e2e.py",
         "hil_sim/nodes/plant.py",
     ),

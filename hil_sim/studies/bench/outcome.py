@@ -28,6 +28,7 @@ def outcome_json(result: Result) -> dict[str, Any]:
             {**asdict(row), "time_a_run_relative_to_first": relative}
             for row, relative in zip(result.campaign, growth(result.campaign))
         ],
+        "board": [asdict(cost) for cost in result.board],
         "aims": [{**asdict(aim), "is_reached": aim.is_reached} for aim in aims(result)],
     }
 

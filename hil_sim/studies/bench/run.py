@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from importlib import import_module
 
+from hil_sim.studies.bench.board import BoardCost, board_costs
 from hil_sim.studies.bench.decision import (
     decision_from_python,
     decision_in_c,
@@ -21,7 +22,7 @@ from hil_sim.studies.bench.machine import Machine, one_core, this_machine
 from hil_sim.studies.bench.period import control_periods, recorded_commands_A
 from hil_sim.studies.bench.problem import Problem, charge_problem
 from hil_sim.studies.bench.race import Absent, ClockNs, Clocks, Peer, Timed, race
-from hil_sim.studies.bench.simulation import BusSpeed, bus_speed
+from hil_sim.studies.bench.simulation import BusSpeed, bus_speed, processes_on
 from hil_sim.studies.bench.throughput import Throughput, campaign_throughput
 
 Note = Callable[[str], None]
@@ -35,6 +36,7 @@ class Section(str, Enum):
     PERIOD = "period"
     SIMULATION = "simulation"
     CAMPAIGN = "campaign"
+    BOARD = "board"
 
 
 _TIMED = {Section.ESTIMATE, Section.DECISION, Section.PERIOD}
@@ -68,13 +70,16 @@ class Result:
     period: list[Timed | Absent] = field(default_factory=list)
     simulation: list[BusSpeed] = field(default_factory=list)
     campaign: list[Throughput] = field(default_factory=list)
+    board: list[BoardCost] = field(default_factory=list)
 
 
 def step_count(sections: set[Section], buses: list[str], campaign_runs: list[int]) -> int:
     """How often run_benchmark tells what comes next."""
     timed = sections & _TIMED
     steps = len(timed) + 1 if timed else 0
-    steps += len(buses) if Section.SIMULATION in sections else 0
+    if Section.SIMULATION in sections:
+        steps += sum(len(processes_on(bus)) for bus in buses)
+    steps += Section.BOARD in sections
     return steps + (len(campaign_runs) if Section.CAMPAIGN in sections else 0)
 
 
@@ -108,13 +113,18 @@ def run_benchmark(
                 note("whole control period")
                 commands_A, peers = recorded_commands_A(problem), [control_periods(problem)]
                 result.period = race(commands_A, peers, effort.repetitions, clocks.cpu_ns)
+    repetitions, time_s = effort.simulation_repetitions, effort.simulation_time_s
     for bus in buses if Section.SIMULATION in sections else ():
-        note(f"simulation on {bus}")
-        repetitions, time_s = effort.simulation_repetitions, effort.simulation_time_s
-        result.simulation.append(bus_speed(bus, preset, time_s, repetitions, clocks))
+        for processes in processes_on(bus):
+            note(f"simulation on {bus}")
+            speed = bus_speed(bus, preset, time_s, repetitions, clocks, processes)
+            result.simulation.append(speed)
     for runs in campaign_runs if Section.CAMPAIGN in sections else ():
         note(f"campaign of {runs} runs")
         result.campaign.append(campaign_throughput(preset, runs, jobs, clocks.wall_ns))
+    if Section.BOARD in sections:
+        note("instructions on the boards")
+        result.board = board_costs(preset)
     return result
 
 

@@ -28,6 +28,7 @@ _ANSWER_TIMEOUT_S = 2.0
 """Long enough for an ECU that is still starting, ten times in a row."""
 _BMS = (sys.executable, "-c", "from bms.cli import main; main()")
 _NS_PER_S = 1e9
+_PARTIES = {1: "one process", 2: "two processes"}
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,8 @@ class BusSpeed:
     """Multiples of real time of the charges on one bus, or why there is none."""
 
     bus: str
+    processes: int
+    """Of plant and ECU together."""
     parties: str
     periods: int
     times_real_time: Quartiles | None
@@ -67,21 +70,27 @@ class _Pace:
         return 100.0 * had_ns / (self._last_ns - self._first_ns)
 
 
+def processes_on(bus: str) -> tuple[int, ...]:
+    """In how many processes plant and ECU are timed on a bus."""
+    interface = bus.partition(":")[0]
+    return {"virtual": (1,), "socketcan": (1, 2)}.get(interface, (2,))
+
+
 def bus_speed(
-    bus: str, preset: str, max_time_s: float, repetitions: int, clocks: Clocks
+    bus: str, preset: str, max_time_s: float, repetitions: int, clocks: Clocks, processes: int
 ) -> BusSpeed:
     """Charges for max_time_s, recorded to can.log; one more, not timed, shows the layers.
 
-    Plant and ECU share a process on a virtual bus and are two processes on any other; the layers
-    are those of the plant's process. A bus that does not exist here or on which a charge fails is
-    named with the reason, but a SocketCAN one is looked for in the guest first. What passes before
-    the first answer of the ECU does not count.
+    Plant and ECU are in one process or in two; the layers are those of the plant's process. A bus
+    that does not exist here or on which a charge fails is named with the reason, but a SocketCAN
+    one is looked for in the guest first. What passes before the first answer of the ECU does not
+    count.
     """
     interface, _, channel = bus.partition(":")
     if interface == "socketcan" and not Path("/sys/class/net", channel).exists():
-        return _in_guest(bus, preset, max_time_s, repetitions)
-    is_virtual = interface == "virtual"
-    parties = "one process" if is_virtual else "two processes"
+        return _in_guest(bus, preset, max_time_s, repetitions, processes)
+    parties = _PARTIES[processes]
+    is_alone = processes == 1
     settings = Settings(
         load_preset(preset), bus=bus, max_time_s=max_time_s, answer_timeout_s=_ANSWER_TIMEOUT_S
     )
@@ -89,23 +98,29 @@ def bus_speed(
     try:
         for _ in range(repetitions):
             pace = _Pace(clocks)
-            _charge(settings, preset, is_virtual, pace)
+            _charge(settings, preset, is_alone, pace)
             shares.append(pace.processor_share_percent())
             speeds.append(pace.times_real_time(settings.preset.timing.sampling_period_s))
             periods = pace.periods
         with sampled() as layers:
-            _charge(settings, preset, is_virtual, _Pace(clocks, layers.forget))
+            _charge(settings, preset, is_alone, _Pace(clocks, layers.forget))
     except BusError as error:
-        return BusSpeed(bus, parties, 0, None, 0.0, {}, str(error))
+        return BusSpeed(bus, processes, parties, 0, None, 0.0, {}, str(error))
     return BusSpeed(
-        bus, parties, periods, Quartiles.of(speeds), median(shares), layers.shares_percent
+        bus,
+        processes,
+        parties,
+        periods,
+        Quartiles.of(speeds),
+        median(shares),
+        layers.shares_percent,
     )
 
 
-def _charge(settings: Settings, preset: str, is_virtual: bool, pace: _Pace) -> None:
+def _charge(settings: Settings, preset: str, is_alone: bool, pace: _Pace) -> None:
     """Charge; BusError when that fails, as a speed of something else would mean nothing."""
     with TemporaryDirectory() as folder, Recorder(Path(folder) / "can.log") as recorder:
-        if is_virtual:
+        if is_alone:
             summary = run_both(settings, recorder, pace.tick).summary
         else:
             with _ecu_process(settings.bus, preset):
@@ -124,12 +139,14 @@ def _ecu_process(bus: str, preset: str) -> Iterator[None]:
             ecu.terminate()
 
 
-def _in_guest(bus: str, preset: str, max_time_s: float, repetitions: int) -> BusSpeed:
+def _in_guest(
+    bus: str, preset: str, max_time_s: float, repetitions: int, processes: int
+) -> BusSpeed:
     """The same, run by this module's command line where the guest provides vcan0."""
-    parties = "two processes in a guest"
+    parties = f"{_PARTIES[processes]} in a guest"
     if not GUEST.is_file():
         reason = f"no such bus on this machine, and no {GUEST.name} beside this package"
-        return BusSpeed(bus, parties, 0, None, 0.0, {}, reason)
+        return BusSpeed(bus, processes, parties, 0, None, 0.0, {}, reason)
     command = [
         "bash",
         GUEST,
@@ -140,6 +157,7 @@ def _in_guest(bus: str, preset: str, max_time_s: float, repetitions: int) -> Bus
         preset,
         max_time_s,
         repetitions,
+        processes,
     ]
     done = subprocess.run(
         list(map(str, command)),
@@ -150,7 +168,7 @@ def _in_guest(bus: str, preset: str, max_time_s: float, repetitions: int) -> Bus
     )
     if done.returncode != 0:
         reason = (done.stderr.strip().splitlines() or [f"{GUEST.name} failed"])[-1]
-        return BusSpeed(bus, parties, 0, None, 0.0, {}, reason)
+        return BusSpeed(bus, processes, parties, 0, None, 0.0, {}, reason)
     content = json.loads(done.stdout)
     speed = content["times_real_time"]
     content["times_real_time"] = None if speed is None else Quartiles(**speed)

@@ -45,6 +45,11 @@ def print_tables(console: Console, result: Result) -> None:
         _layers(result).print(console)
     if result.campaign:
         _campaign(result).print(console)
+    for cost in result.board:
+        if cost.not_run:
+            console.print(f"not run: {cost.board}: {cost.not_run}", soft_wrap=True, markup=False)
+    if result.board:
+        _board(result).print(console)
     reached = list(aims(result))
     if reached:
         _aims(result).print(console)
@@ -133,10 +138,25 @@ def _campaign(result: Result) -> TextTable:
     return table
 
 
+def _board(result: Result) -> TextTable:
+    headings = ("estimate and decision, worst", "control period, median", "application", "image")
+    table = TextTable("", *headings, title="Boards: instructions in a charge, bytes of flash")
+    for row in result.board:
+        figures = (
+            row.estimate_and_decision_worst,
+            row.period_median,
+            row.application_flash_B,
+            row.image_flash_B,
+        )
+        table.add_row(row.board, *("" if value is None else f"{value:,}" for value in figures))
+    return table
+
+
 def _aims(result: Result) -> TextTable:
     table = TextTable("", "measured", "wanted", "", title="Aims")
     for aim in aims(result):
-        sign, unit = ("at most", " ns") if aim.unit == "ns" else ("at least", " x")
+        sign = "at most" if aim.is_small_wanted else "at least"
+        unit = " x" if aim.unit == "times" else f" {aim.unit}"
         table.add_row(
             aim.name,
             f"{aim.measured:,.0f}{unit}",

@@ -14,12 +14,12 @@ from bms.calibration import calibration_fields
 from bms.presets import Preset
 from bms.presets.schema import Sensor
 from codegen.can_database import load_database
+from hil_sim.native.cell_fields import cell_fields
 from hil_sim.plant.charger import lag_share
 from hil_sim.plant.sensors import Readings
 from hil_sim.plant.true_cell import COOLING_BAND_K, TrueCell
 from hil_sim.run.charge import OFF_PERIODS, READY_PERIODS, STARTING_PERIODS
 from hil_sim.studies.campaign._runner import ffi, lib
-from hil_sim.studies.campaign.native_cell import cell_fields
 from hil_sim.studies.campaign.nominal import nominal_fields
 from hil_sim.studies.campaign.settings import CampaignSettings
 
@@ -58,6 +58,9 @@ class Scenario:
                 "period_s": preset.timing.sampling_period_s,
                 "max_time_s": settings.max_time_s,
                 "reference_current_A": preset.limits.reference_current_A,
+                "has_mode": settings.mode is not None,
+                "mode": settings.mode or 0,
+                "full_by_s": -1.0,
                 "completion_soc": preset.limits.completion_soc,
                 "cooling_band_K": COOLING_BAND_K,
                 "noise_cutoff": Sensor.NOISE_CUTOFF,
@@ -108,6 +111,13 @@ class CampaignCharge:
             },
         )
         lib.charge_begin(self.fields, scenario.calibration)
+
+    @property
+    def mean_core_temperature_K(self) -> float:
+        """Mean over the control periods of the charge so far."""
+        fields = self.fields
+        periods: int = max(fields.periods - fields.edge_period, 1)
+        return float(fields.core_sum_K) / periods
 
     @property
     def is_over(self) -> bool:

@@ -11,10 +11,10 @@ from bms.barrier.family import family_of, time_constant_factor
 from bms.cell import CellFactors, CellParameters, CellState, Polarisation, scaled
 from bms.errors import InputError
 from bms.presets import Preset
+from hil_sim.native.cell_fields import thermal_matrix_per_s
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.plant.sensors import Readings
 from hil_sim.plant.true_cell import COOLING_BAND_K, TrueCell
-from hil_sim.studies.campaign.native_cell import thermal_matrix_per_s
 
 EMPTY_SOC, HALF_FULL_SOC = (0.0, 0.5), (0.5, 0.9)
 HALF_FULL_SHARE = 0.25

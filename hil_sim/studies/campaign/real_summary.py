@@ -22,9 +22,9 @@ from hil_sim.studies.campaign.summary import (
 )
 
 OVERFILLED_SOC = 1.005
-UNFILLED_SOC = 0.96
-"""True state of charge above which a cell is overfilled, and below which "complete" is wrong."""
-FULL_SOC = 0.99
+"""True state of charge above which a cell is overfilled."""
+UNFILLED_SOC = 0.03
+"""By which the true state of charge may at most be below that of completion at "complete"."""
 LEAST_COMPLETE_SHARE = 0.99
 """Share of the charges that have to be complete within the time limit."""
 WORST_RUNS = 3
@@ -57,7 +57,10 @@ def _figures(settings: CampaignSettings, rows: Rows, controller: str) -> dict[st
     final_soc = column(rows, f"{name}_final_soc")
     stops = column(rows, f"{name}_stops")
     excesses = _excesses(settings, rows, name)
-    excesses["unfilled"] = np.where(outcomes == "complete", UNFILLED_SOC - final_soc, -np.inf)
+    full_soc = settings.preset.limits.completion_soc
+    excesses["unfilled"] = np.where(
+        outcomes == "complete", full_soc - UNFILLED_SOC - final_soc, -np.inf
+    )
     excesses["fault"] = np.where(np.isin(outcomes, ("fault", "not-ready")), 1.0, -np.inf)
     is_complete = outcomes == "complete"
     peaks = [peak for peak, _ in limits(settings).values()]
@@ -68,7 +71,7 @@ def _figures(settings: CampaignSettings, rows: Rows, controller: str) -> dict[st
         },
         "outcomes": dict(sorted(Counter(outcomes.tolist()).items())),
         "complete": _share(is_complete),
-        "full": _share(is_complete & (final_soc >= FULL_SOC)),
+        "full": _share(is_complete & (final_soc >= full_soc)),
         "stops": {
             "runs": int(np.sum(stops > 0)),
             "total": int(stops.sum()),

@@ -145,7 +145,7 @@ def real_row(run: int, drawn: RealDraw, charges: dict[str, CampaignCharge]) -> R
 def _charged(charges: dict[str, CampaignCharge]) -> Row:
     result: Row = {}
     for name, charge in charges.items():
-        peaks = charge.fields.peaks
+        peaks = charge.fields.peaks.cell
         values = {
             "outcome": charge.outcome,
             "charge_time_s": charge.fields.time_s if charge.outcome == "complete" else "",

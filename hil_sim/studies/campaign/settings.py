@@ -12,6 +12,7 @@ from typing import Any
 from bms.errors import InputError
 from bms.model.model_file import KanModel
 from bms.presets import Preset
+from hil_sim.bus.catalog import Mode
 from hil_sim.studies.campaign.nominal import NominalPart
 
 CHUNK_RUNS = 20
@@ -47,6 +48,8 @@ class CampaignSettings:
     family: CellFamily = CellFamily.PUBLISHED
     nominal_part: NominalPart | None = None
     """Part of the family that the firmware takes for nominal, though the cells are not."""
+    mode: Mode | None = None
+    """How the firmware is asked to charge; None leaves the message out that asks for it."""
 
     def __post_init__(self) -> None:
         if self.runs < 1:
@@ -56,12 +59,14 @@ class CampaignSettings:
                 f"preset '{self.preset.name}': has no [cell.interval], so there is no family to "
                 "draw from; leave out --family real or choose a preset with one"
             )
+        if self.mode is Mode.BY_TIME:
+            raise InputError("campaign: mode by-time has no time; choose fastest or fixed")
         if self.nominal_part is not None and self.family is not CellFamily.REAL:
             raise InputError("--nominal-part: only --family real has parts; add it")
 
     def identity(self) -> dict[str, Any]:
         """Everything that the results depend on, as plain JSON; stored beside them."""
-        return {
+        identity = {
             "preset": self.preset.name,
             "preset_hash": self.preset.hash,
             "model_hash": self.model.hash,
@@ -72,6 +77,10 @@ class CampaignSettings:
             "family": self.family.value,
             "nominal_part": None if self.nominal_part is None else self.nominal_part.value,
         }
+        if self.mode is not None:
+            # Left out without, so that folders of campaigns without a mode stay theirs.
+            identity["mode"] = self.mode.label
+        return identity
 
     @property
     def hash(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -40,14 +40,21 @@ def run_one(scenario: Scenario, settings: CampaignSettings, run: int) -> Row:
     numbers = streams(settings.seed, run)
     if settings.family is CellFamily.REAL:
         real = draw_real(preset, settings.max_time_s, numbers.draw)
-        return real_row(run, real, _charges(scenario, settings, real, numbers))
+        return real_row(run, real, play(scenario, settings, real, numbers))
     drawn = draw(preset, run, numbers.draw)
-    return row(preset, run, drawn, _charges(scenario, settings, drawn, numbers))
+    return row(preset, run, drawn, play(scenario, settings, drawn, numbers))
 
 
-def _charges(
-    scenario: Scenario, settings: CampaignSettings, drawn: Draw | RealDraw, numbers: Streams
+def play(
+    scenario: Scenario,
+    settings: CampaignSettings,
+    drawn: Draw | RealDraw,
+    numbers: Streams,
+    controllers: Iterable[str] = CONTROLLERS,
+    block_periods: int = BLOCK_PERIODS,
+    told: Callable[[CampaignCharge], None] = lambda charge: None,
 ) -> dict[str, CampaignCharge]:
+    """Charges of a drawn cell to their ends, by controller; `told` sees each after each block."""
     preset = settings.preset
     step_s = preset.timing.sampling_period_s / SUB_STEPS
     longest_s = settings.max_time_s + 60.0
@@ -66,16 +73,17 @@ def _charges(
     true_cell = drawn.true_cell(preset)
     charges = {
         name: CampaignCharge(scenario, name, true_cell, first[0], watched and name == FIRMWARE)
-        for name in CONTROLLERS
+        for name in controllers
     }
     surface_before = float(first[0, 2])
     while not all(charge.is_over for charge in charges.values()):
-        normals = numbers.sensors.standard_normal((BLOCK_PERIODS, 5))
-        knots = blocks(BLOCK_PERIODS * SUB_STEPS)
+        normals = numbers.sensors.standard_normal((block_periods, 5))
+        knots = blocks(block_periods * SUB_STEPS)
         limit_slope(knots, surface_before, largest_change_K_per_s)
         surface_before = float(knots[-1, 2])
         for charge in charges.values():
             charge.advance(normals, knots)
+            told(charge)
     return charges
 
 

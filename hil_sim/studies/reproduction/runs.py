@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from bms.errors import BmsError
 from bms.firmware import Ecu
 from bms.presets import load_preset
+from bms.presets.paper_form import in_paper_form
+from hil_sim.bus.catalog import Mode
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.result import RunResult
 from hil_sim.run.session import run_both
@@ -50,8 +52,9 @@ def all_cases(presets: Sequence[str] = PRESETS) -> list[Case]:
 def run_case(case: Case, seed: int, max_time_s: float) -> RunResult:
     """Charge as a case says, with the seed of all others."""
     settings = Settings(
-        load_preset(case.preset),
+        in_paper_form(load_preset(case.preset)),
         controller=case.controller,
+        mode=Mode.FIXED,
         disturbance=case.disturbance,
         seed=seed,
         max_time_s=max_time_s,

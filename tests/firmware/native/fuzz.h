@@ -49,6 +49,7 @@ typedef struct {
     uint32_t frame_share; /* of 1024: frames that are damaged */
     uint32_t foreign_share;
     uint32_t jitter_share; /* periods in which the ECU does not step once */
+    bool is_slow;
     uint32_t value_share; /* periods in which a value begins to be wrong */
     session_value_t wrong_value;
     uint32_t wrong_kind;

@@ -20,6 +20,7 @@ from bms.firmware import Ecu
 from bms.model.model_file import shipped_model_path
 from bms.presets import load_preset
 from hil_sim.bus.buses import open_bus
+from hil_sim.bus.catalog import Mode
 from hil_sim.bus.database import load_codecs
 from hil_sim.faults import Injection, parse_fault
 from hil_sim.logs.recorder import Recorder
@@ -43,6 +44,7 @@ class Scenario:
     on: tuple[range, ...] = (range(6, 10_000),)
     preset: str = "paper_calibrated"
     lagged: bool = False
+    mode: Mode | None = None
     soc: float | None = None
     temperature_K: float | None = None
     disturbance: DisturbanceKind = DisturbanceKind.GAUSSIAN
@@ -51,14 +53,20 @@ class Scenario:
 
 SCENARIOS = {
     "charge_start": Scenario(250),
-    "lin2014_hot": Scenario(250, preset="lin2014", temperature_K=318.0, soc=0.3),
+    "lin2014_hot": Scenario(250, preset="lin2014", mode=Mode.FIXED, temperature_K=321.0, soc=0.3),
     "cold_start": Scenario(250, temperature_K=278.5, soc=0.05),
-    "hot_derating": Scenario(350, temperature_K=314.0, soc=0.2, disturbance=DisturbanceKind.UPWARD),
+    "hot_derating": Scenario(
+        350,
+        temperature_K=321.0,
+        soc=0.2,
+        disturbance=DisturbanceKind.UPWARD,
+    ),
     "lagged_model": Scenario(
         350,
         on=(range(160, 10_000),),
         lagged=True,
-        temperature_K=316.0,
+        mode=Mode.FIXED,
+        temperature_K=318.0,
         soc=0.3,
         faults=(
             {"kind": "sensor-not-available", "sensor": "current_A", "from_period": 210}
@@ -117,7 +125,7 @@ SCENARIOS = {
         soc=0.5,
         temperature_K=300.0,
     ),
-    "infeasible": Scenario(250, temperature_K=322.6, soc=0.5, disturbance=DisturbanceKind.UPWARD),
+    "infeasible": Scenario(250, temperature_K=322.95, soc=0.5, disturbance=DisturbanceKind.UPWARD),
     "complete": Scenario(350, temperature_K=305.0, soc=0.984),
 }
 
@@ -159,7 +167,7 @@ def record(name: str, path: Path) -> None:
                 answer = node.exchange(
                     period,
                     injection.readings(sensors.read(_readings(plant)), plant.state),
-                    Request(is_on, preset.limits.reference_current_A, plug_in_soc),
+                    Request(is_on, preset.limits.reference_current_A, plug_in_soc, scenario.mode),
                 )
                 plant.current_A = injection.supplied_A(
                     charger.current_A(answer.usable_command_A), plant.current_A

@@ -1,8 +1,7 @@
 #include "charge.h"
 
 #include <math.h>
-
-#define KNOT_WIDTH 4
+#include <stddef.h>
 
 static double larger(double a, double b)
 {
@@ -42,14 +41,17 @@ void charge_begin(charge_t *charge, const bms_calibration_t *calibration)
     bms_init(&charge->link.bms, &config);
     charge->outcome = CHARGE_RUNNING;
     charge->first_derate_s = -1.0;
+    charge->predicted_s = -1.0;
     charge->first_fault = FAULT_NONE;
     charge->surface_error_K_per_s = NAN;
     charge->differences = differences_of(&charge->cell, &charge->scenario->nominal);
     charge->peaks = (charge_peaks_t){
-        .core_temperature_K = start->core,
-        .surface_temperature_K = start->surface,
-        .voltage_V = cell_terminal_voltage_V(&charge->cell, &charge->memory, charge->current_A),
-        .soc = start->soc,
+        .cell = {
+            .soc = start->soc,
+            .core_temperature_K = start->core,
+            .surface_temperature_K = start->surface,
+            .voltage_V = cell_terminal_voltage_V(&charge->cell, &charge->memory, charge->current_A),
+        },
     };
 }
 
@@ -93,9 +95,21 @@ static void note_firmware(charge_t *charge, uint32_t state)
 static link_answer_t ask_firmware(charge_t *charge, const double readings[LINK_READINGS])
 {
     const charge_scenario_t *scenario = charge->scenario;
+    const double run_s =
+        charge->requested ? (double)(charge->periods - charge->edge_period) * scenario->period_s
+                          : 0.0;
+    const bool has_time = scenario->full_by_s >= 0.0;
+    const link_request_t asked = {
+        .charge = charge->requested,
+        .reference_current_A = scenario->reference_current_A,
+        .plug_in_soc = charge->plug_in_soc,
+        .has_mode = scenario->has_mode,
+        .mode = scenario->mode,
+        .time_to_full_s = has_time ? fmax(scenario->full_by_s - run_s, 0.0) : -1.0,
+    };
     const link_answer_t answer =
-        link_exchange(&charge->link, &scenario->signals, readings, charge->requested,
-                      scenario->reference_current_A, charge->plug_in_soc);
+        link_exchange(&charge->link, &scenario->signals, readings, &asked);
+    charge->predicted_s = answer.predicted_s;
     note_firmware(charge, answer.state);
     return answer;
 }
@@ -127,7 +141,7 @@ static link_answer_t ask_baseline(charge_t *charge, const double readings[LINK_R
     for (uint32_t i = 0u; i < LINK_READINGS; i++) {
         heard[i] = link_over_the_bus(&signals->readings[i], readings[i]);
     }
-    link_answer_t answer = { true, 0.0, BMS_STANDBY };
+    link_answer_t answer = { true, 0.0, BMS_STANDBY, -1.0 };
     if (charge->requested && is_full(charge, heard[0], heard[1])) {
         answer.state = BMS_COMPLETE;
     } else if (charge->requested) {
@@ -160,8 +174,9 @@ static charge_outcome_t outcome_of(const charge_t *charge, uint32_t state)
     return (run_s >= scenario->max_time_s) ? CHARGE_TIME_LIMIT : CHARGE_RUNNING;
 }
 
-static void note_model_error(charge_t *charge, const cell_state_t *disturbance)
+static void note_model_error(void *watcher, const cell_state_t *disturbance)
 {
+    charge_t *charge = (charge_t *)watcher;
     const charge_differences_t *less = &charge->differences;
     const cell_t *nominal = &charge->scenario->nominal;
     const cell_state_t *state = &charge->memory.state;
@@ -205,47 +220,14 @@ static double core_growth(const charge_t *charge)
     return at_current_K_per_s / bound->at_reference_K_per_s;
 }
 
-static void note_voltage(charge_t *charge, const cell_memory_t *memory)
-{
-    const double voltage_V = cell_terminal_voltage_V(&charge->cell, memory, charge->current_A);
-    charge->peaks.voltage_V = larger(charge->peaks.voltage_V, voltage_V);
-}
-
 static void advance_plant(charge_t *charge, const double *knots)
 {
-    charge_peaks_t *peaks = &charge->peaks;
-    cell_memory_t *memory = &charge->memory;
-    const bool is_plain = (charge->cell.branches == 0u) && (charge->cell.resistance.rows == 0u);
-    const double growth = core_growth(charge);
-    cell_state_t before = charge->knot;
-    before.core *= growth;
-    cell_memory_t fullest = *memory;
-    if (!is_plain) {
-        note_voltage(charge, memory);
-    }
-    for (uint32_t i = 0u; i < CHARGE_SUB_STEPS; i++) {
-        const double *end = &knots[i * KNOT_WIDTH];
-        const cell_state_t after = { end[0], end[1] * growth, end[2], end[3] };
-        if (charge->watches_model_error) {
-            note_model_error(charge, &before);
-        }
-        cell_step(&charge->cell, memory, charge->current_A, charge->cooling_power_W, &before,
-                  &after);
-        before = after;
-        fullest.state.soc = larger(fullest.state.soc, memory->state.soc);
-        peaks->core_temperature_K = larger(peaks->core_temperature_K, memory->state.core);
-        peaks->surface_temperature_K = larger(peaks->surface_temperature_K, memory->state.surface);
-        if (!is_plain) {
-            note_voltage(charge, memory);
-        }
-    }
-    const double *last = &knots[(CHARGE_SUB_STEPS - 1) * KNOT_WIDTH];
-    charge->knot = (cell_state_t){ last[0], last[1], last[2], last[3] };
-    peaks->soc = larger(peaks->soc, fullest.state.soc);
-    if (is_plain) {
-        /* At one current the voltage rises with the state of charge, so its peak is there. */
-        note_voltage(charge, &fullest);
-    }
+    charge->heat_J += (cell_heat_W(&charge->cell, &charge->memory.state, charge->current_A) +
+                       cell_polarisation_heat_W(&charge->cell, charge->memory.polarisation_V)) *
+                      charge->scenario->period_s;
+    cell_hold(&charge->cell, &charge->memory, charge->current_A, charge->cooling_power_W,
+              core_growth(charge), &charge->knot, knots, CHARGE_SUB_STEPS, &charge->peaks.cell,
+              charge->watches_model_error ? note_model_error : NULL, charge);
 }
 
 /* Current of the coming period, from an answer: as hil_sim/plant/charger.py. */
@@ -279,6 +261,7 @@ static void run_period(charge_t *charge, const double *normals, const double *kn
     supply(charge, &answer);
     if (charge->requested) {
         charge->time_s = (double)(charge->periods - charge->edge_period) * scenario->period_s;
+        charge->core_sum_K += charge->memory.state.core;
         if ((answer.state == BMS_DERATED) && (charge->first_derate_s < 0.0)) {
             charge->first_derate_s = charge->time_s;
         }
@@ -300,7 +283,7 @@ void charge_advance(charge_t *charge, const double *normals, const double *knots
 {
     for (uint32_t i = 0u; (i < periods) && (charge->outcome == CHARGE_RUNNING); i++) {
         run_period(charge, &normals[i * LINK_READINGS],
-                   &knots[i * CHARGE_SUB_STEPS * KNOT_WIDTH]);
+                   &knots[i * CHARGE_SUB_STEPS * CELL_KNOT_WIDTH]);
     }
 }
 
@@ -308,7 +291,7 @@ void charge_limit_slope(double *knots, uint32_t count, double before, double lar
 {
     const uint32_t surface = 2u;
     for (uint32_t i = 0u; i < count; i++) {
-        double *knot = &knots[i * KNOT_WIDTH + surface];
+        double *knot = &knots[i * CELL_KNOT_WIDTH + surface];
         *knot = before + fmin(fmax(*knot - before, -largest_change), largest_change);
         before = *knot;
     }

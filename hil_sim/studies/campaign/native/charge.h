@@ -38,6 +38,9 @@ typedef struct {
     double period_s;
     double max_time_s;
     double reference_current_A;
+    bool has_mode;    /* the firmware is asked for one */
+    uint32_t mode;    /* codec_mode_t */
+    double full_by_s; /* from the edge on; negative: no time is asked for */
     double completion_soc;
     double cooling_band_K;
     double noise_cutoff; /* of the standard normal numbers */
@@ -53,10 +56,7 @@ typedef struct {
 
 /* Largest values of a charge, at any sub-step. */
 typedef struct {
-    double core_temperature_K;
-    double surface_temperature_K;
-    double voltage_V;
-    double soc;
+    cell_peaks_t cell;
     double estimate_error_K;     /* of the firmware, while charging, at the control periods */
     cell_state_t model_error;    /* |true less nominal rates|, disturbance included */
     double surface_error_slope_K_per_s2;
@@ -101,6 +101,9 @@ typedef struct {
     uint32_t stops; /* from a current to a command of 0 A, while the charge goes on */
     double surface_error_K_per_s; /* at the last sub-step; NaN before the first */
     double counted_soc;           /* by CC-CV, from its measurements */
+    double predicted_s;           /* to full, as the firmware told last; negative: not told */
+    double heat_J;                /* that the cell has produced */
+    double core_sum_K;            /* of the control periods since the edge */
     charge_peaks_t peaks;
     link_t link;
 } charge_t;

@@ -5,6 +5,10 @@
 #include "can_catalog.h"
 #include "can_db.h"
 
+/* Times of the modes, in s: the longest that is sent, and what says that there is none. */
+#define LONGEST_TIME_S 65533.0
+#define TIME_NOT_AVAILABLE 65535u
+
 static double raw_of(const link_signal_t *signal, double value)
 {
     const double steps = value / signal->scale - signal->offset_steps;
@@ -51,12 +55,43 @@ static void send_readings(link_t *link, const link_signals_t *signals,
     send(link, CAN_RECEIVED_COOLANT, &frame);
 }
 
+static void send_mode(link_t *link, const link_request_t *asked)
+{
+    can_frame_t frame = { 0 };
+    const struct can_db_charge_mode_t mode = {
+        .mode = (uint8_t)asked->mode,
+        .time_to_full = (asked->time_to_full_s < 0.0)
+                            ? TIME_NOT_AVAILABLE
+                            : (uint16_t)rint(fmin(asked->time_to_full_s, LONGEST_TIME_S)),
+    };
+    (void)can_db_charge_mode_pack(frame.data, &mode, sizeof frame.data);
+    send(link, CAN_RECEIVED_CHARGE_MODE, &frame);
+}
+
+/* Time to full of a frame with the plan; negative where it has none. */
+static double predicted_s(link_t *link, const can_frame_t *frame)
+{
+    const codec_message_t *message = &CAN_TRANSMITTED[CAN_TRANSMITTED_PLAN];
+    if (e2e_check(&link->plan_e2e, frame->data, frame->length, message->length, message->data_ids,
+                  1u) != E2E_OK) {
+        return -1.0;
+    }
+    struct can_db_plan_t plan;
+    (void)can_db_plan_unpack(&plan, frame->data, frame->length);
+    const double told_s = (double)plan.predicted_time_to_full;
+    return (told_s <= LONGEST_TIME_S) ? told_s : -1.0;
+}
+
 static link_answer_t hear(link_t *link, const link_signals_t *signals)
 {
     const codec_message_t *message = &CAN_TRANSMITTED[CAN_TRANSMITTED_CHARGE_COMMAND];
-    link_answer_t answer = { false, 0.0, BMS_INIT };
+    link_answer_t answer = { false, 0.0, BMS_INIT, -1.0 };
     can_frame_t frame;
     while (bms_transmit(&link->bms, &frame)) {
+        if (frame.id == CAN_TRANSMITTED[CAN_TRANSMITTED_PLAN].id) {
+            answer.predicted_s = predicted_s(link, &frame);
+            continue;
+        }
         if ((frame.id != message->id) ||
             (e2e_check(&link->command_e2e, frame.data, frame.length, message->length,
                        message->data_ids, 1u) != E2E_OK)) {
@@ -73,18 +108,21 @@ static link_answer_t hear(link_t *link, const link_signals_t *signals)
 }
 
 link_answer_t link_exchange(link_t *link, const link_signals_t *signals,
-                            const double readings[LINK_READINGS], bool charge,
-                            double reference_current_A, double plug_in_soc)
+                            const double readings[LINK_READINGS], const link_request_t *asked)
 {
     send_readings(link, signals, readings);
     can_frame_t frame = { 0 };
     const struct can_db_charge_request_t request = {
-        .request = charge ? REQUEST_CHARGE : REQUEST_OFF,
-        .reference_current = (uint32_t)raw_of(&signals->reference_current, reference_current_A),
-        .plug_in_state_of_charge = (uint16_t)raw_of(&signals->plug_in_soc, plug_in_soc),
+        .request = asked->charge ? REQUEST_CHARGE : REQUEST_OFF,
+        .reference_current =
+            (uint32_t)raw_of(&signals->reference_current, asked->reference_current_A),
+        .plug_in_state_of_charge = (uint16_t)raw_of(&signals->plug_in_soc, asked->plug_in_soc),
     };
     (void)can_db_charge_request_pack(frame.data, &request, sizeof frame.data);
     send(link, CAN_RECEIVED_CHARGE_REQUEST, &frame);
+    if (asked->has_mode) {
+        send_mode(link, asked);
+    }
     link->counter++;
     bms_step(&link->bms);
     return hear(link, signals);

@@ -25,16 +25,28 @@ typedef struct {
     link_signal_t command_current;
 } link_signals_t;
 
+/* What the charger asks for. Without a mode the message that asks for one is left out. */
+typedef struct {
+    bool charge;
+    double reference_current_A;
+    double plug_in_soc;
+    bool has_mode;
+    uint32_t mode; /* codec_mode_t */
+    double time_to_full_s; /* negative: none is asked for */
+} link_request_t;
+
 typedef struct {
     bool intact; /* a charge command passed its end-to-end check */
     double command_A;
     uint32_t state; /* bms_state_t */
+    double predicted_s; /* to full; negative where the plan told none */
 } link_answer_t;
 
 typedef struct {
     bms_t bms;
     uint8_t counter;
     e2e_receiver_t command_e2e;
+    e2e_receiver_t plan_e2e;
 } link_t;
 
 /* Value that arrives when a value is sent: rounded to the signal's step, within its range. */
@@ -42,7 +54,7 @@ double link_over_the_bus(const link_signal_t *signal, double value);
 
 /* One control period of the firmware. */
 link_answer_t link_exchange(link_t *link, const link_signals_t *signals,
-                            const double readings[LINK_READINGS], bool charge,
-                            double reference_current_A, double plug_in_soc);
+                            const double readings[LINK_READINGS],
+                            const link_request_t *asked);
 
 #endif

@@ -5,6 +5,7 @@
 
 #include <stdint.h>
 
+#define CELL_KNOT_WIDTH 4
 #define CELL_MAX_POINTS 64
 #define CELL_MAX_TABLE 1024
 #define CELL_MAX_BRANCHES 3
@@ -71,6 +72,14 @@ typedef struct {
     double coolant;
 } cell_state_t;
 
+/* Highest values at any instant so far. */
+typedef struct {
+    double soc;
+    double core_temperature_K;
+    double surface_temperature_K;
+    double voltage_V;
+} cell_peaks_t;
+
 /* What a cell carries from step to step. */
 typedef struct {
     cell_state_t state;
@@ -88,6 +97,16 @@ double cell_polarisation_heat_W(const cell_t *cell, const double *polarisation_V
  * after. */
 void cell_step(const cell_t *cell, cell_memory_t *memory, double current_A, double cooling_power_W,
                const cell_state_t *before, const cell_state_t *after);
+
+/* Looks at a cell at the beginning of a sub-step, with the disturbance there. */
+typedef void (*cell_watch_t)(void *watcher, const cell_state_t *disturbance);
+
+/* Holds a current and a cooling power over sub-steps, and the peaks with it. A knot is the
+ * disturbance of soc, core, surface and coolant at an instant: the one before is kept, the others
+ * are those at the end of each sub-step. `growth` is a factor on the core's. `watch` may be NULL. */
+void cell_hold(const cell_t *cell, cell_memory_t *memory, double current_A, double cooling_power_W,
+               double growth, cell_state_t *knot, const double *knots, uint32_t steps,
+               cell_peaks_t *peaks, cell_watch_t watch, void *watcher);
 
 double cell_open_circuit_voltage_V(const cell_t *cell, double soc);
 

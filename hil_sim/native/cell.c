@@ -1,5 +1,8 @@
 #include "cell.h"
 
+#include <stdbool.h>
+#include <stddef.h>
+
 /* Index of the point below, so that one above exists; needs two points and a value on the axis. */
 static uint32_t point_below(const double *axis, uint32_t points, double at)
 {
@@ -153,4 +156,51 @@ double cell_terminal_voltage_V(const cell_t *cell, const cell_memory_t *memory, 
         voltage_V += memory->polarisation_V[i];
     }
     return voltage_V;
+}
+
+static double larger(double a, double b)
+{
+    return (a > b) ? a : b;
+}
+
+static void note_voltage(const cell_t *cell, const cell_memory_t *memory, double current_A,
+                         cell_peaks_t *peaks)
+{
+    peaks->voltage_V =
+        larger(peaks->voltage_V, cell_terminal_voltage_V(cell, memory, current_A));
+}
+
+void cell_hold(const cell_t *cell, cell_memory_t *memory, double current_A, double cooling_power_W,
+               double growth, cell_state_t *knot, const double *knots, uint32_t steps,
+               cell_peaks_t *peaks, cell_watch_t watch, void *watcher)
+{
+    const bool is_plain = (cell->branches == 0u) && (cell->resistance.rows == 0u);
+    cell_memory_t fullest = *memory;
+    if (!is_plain) {
+        note_voltage(cell, memory, current_A, peaks);
+    }
+    cell_state_t before = *knot;
+    before.core *= growth;
+    for (uint32_t i = 0u; i < steps; i++) {
+        const double *end = &knots[i * CELL_KNOT_WIDTH];
+        const cell_state_t after = { end[0], end[1] * growth, end[2], end[3] };
+        if (watch != NULL) {
+            watch(watcher, &before);
+        }
+        cell_step(cell, memory, current_A, cooling_power_W, &before, &after);
+        before = after;
+        fullest.state.soc = larger(fullest.state.soc, memory->state.soc);
+        peaks->core_temperature_K = larger(peaks->core_temperature_K, memory->state.core);
+        peaks->surface_temperature_K = larger(peaks->surface_temperature_K, memory->state.surface);
+        if (!is_plain) {
+            note_voltage(cell, memory, current_A, peaks);
+        }
+    }
+    const double *last = &knots[(steps - 1u) * CELL_KNOT_WIDTH];
+    *knot = (cell_state_t){ last[0], last[1], last[2], last[3] };
+    peaks->soc = larger(peaks->soc, fullest.state.soc);
+    if (is_plain) {
+        /* At one current the voltage rises with the state of charge, so its peak is there. */
+        note_voltage(cell, &fullest, current_A, peaks);
+    }
 }

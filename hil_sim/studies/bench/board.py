@@ -1,0 +1,60 @@
+"""What the firmware costs on a microcontroller: instructions in QEMU, and flash of its image."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bms.errors import InputError
+from bms.image import TARGETS
+from bms.native_build import ROOT
+from bms.presets import load_preset
+from codegen.budgets.budgets import load_figures
+from hil_sim.studies.cost import measure_cost
+from hil_sim.targets.catalog import built_folder
+
+_FIRMWARE = ROOT / "firmware_c"
+_FEW_CHARGES, _FEW_STATES = 1, 50
+"""Here the charge counts; `make cost` also searches for the worst."""
+
+
+@dataclass(frozen=True)
+class BoardCost:
+    """Instructions over a charge of the default preset, and bytes of the last accepted build."""
+
+    board: str
+    estimate_and_decision_worst: int | None
+    period_median: int | None
+    application_flash_B: int | None
+    image_flash_B: int | None
+    not_run: str = ""
+
+
+def board_costs(preset: str) -> list[BoardCost]:
+    """Of each board; what cannot run here, or was not built, is named with the reason."""
+    return [_board_cost(board, preset) for board in TARGETS]
+
+
+def _board_cost(board: str, preset: str) -> BoardCost:
+    figures = load_figures(_FIRMWARE / "figures.json", board.replace("-", "_"))
+    application_B, image_B = (
+        figures[part].flash if part in figures else None for part in ("core", "image")
+    )
+    try:
+        report = measure_cost(
+            built_folder(board) / "cost.elf",
+            board,
+            load_preset(preset),
+            0,
+            _FEW_CHARGES,
+            _FEW_STATES,
+        )
+    except InputError as error:
+        return BoardCost(board, None, None, application_B, image_B, str(error))
+    costs = report.costs
+    return BoardCost(
+        board,
+        costs["estimate_and_decision"].charge_worst,
+        costs["control_period"].charge_median,
+        application_B,
+        image_B,
+    )

@@ -1,0 +1,1 @@
+"""How fast each controller charges beside the bound that none can beat, and what it crosses."""

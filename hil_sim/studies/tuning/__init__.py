@@ -1,0 +1,1 @@
+"""Gains and growth limit of a preset, chosen for the time to full under the certificate."""
