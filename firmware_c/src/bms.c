@@ -3,18 +3,12 @@
 #include <math.h>
 #include <stddef.h>
 
+#include "bms_growth.h"
 #include "bms_plan.h"
 #include "bms_symptoms.h"
 #include "can_catalog.h"
 #include "numeric.h"
 #include "request.h"
-
-/* Shares of the preset's growth: with which the current rises after it has met a limit, and what is
- * added in each period without one. */
-#define LEAST_GROWTH 0.0067f
-#define GROWTH_RISE 0.0133f
-/* With which the current falls to a weaker plan. */
-#define PLAN_FALL 0.25f
 
 /* Periods that the other nodes have to come up before their silence is a fault. */
 #define START_UP_PERIODS 50u
@@ -156,42 +150,6 @@ static void follow_request(bms_t *bms, uint32_t symptoms)
     }
 }
 
-/* What is asked for, within the preset's strongest current and the growth of one period. To a weaker
- * plan the current falls gradually, to a weaker request at once. The weaker of two charging currents
- * is the greater number. */
-static float wanted_current_A(const bms_t *bms)
-{
-    const bms_calibration_t *calibration = bms->calibration;
-    const float asked_A = bms->measurement.reference_current_A;
-    const float planned_A =
-        numeric_smaller(bms->command_A + PLAN_FALL * calibration->current_growth_A,
-                        planner_reference_A(&bms->planner, asked_A));
-    const float allowed_A = numeric_larger(calibration->reference_current_A,
-                                           bms->command_A - bms->growth_A);
-    /* A request that is no number has to come last, to be refused. */
-    return numeric_larger(allowed_A, numeric_larger(planned_A, asked_A));
-}
-
-/* What a limit allows jitters with the noise of the readings. The current obeys each fall at once,
- * and so stays on the lower side of that jitter if it rises slowly: where a limit was met it begins
- * anew with a small growth, and grows faster the longer none is. Until then that limit is the one
- * that holds it back. */
-static void follow_growth(bms_t *bms)
-{
-    const float most_A = bms->calibration->current_growth_A;
-    if (!is_charging(bms) || bms->monitor.stop) {
-        bms->growth_A = most_A;
-        rcbf_steadier_reset(&bms->steadier);
-    } else if (bms->decision.feasible && (bms->decision.active != RCBF_NONE)) {
-        bms->limit = bms->decision.active;
-        bms->growth_A = LEAST_GROWTH * most_A;
-    } else if (bms->decision.feasible && (bms->growth_A < most_A)) {
-        bms->decision.active = bms->limit;
-        bms->state = BMS_DERATED;
-        bms->growth_A = numeric_smaller(bms->growth_A + GROWTH_RISE * most_A, most_A);
-    }
-}
-
 static bool is_full(const bms_t *bms)
 {
     const bms_calibration_t *calibration = bms->calibration;
@@ -215,7 +173,7 @@ static void decide(bms_t *bms)
     if (is_charging(bms) && has_family(bms)) {
         const family_reading_t reading = reading_of(bms);
         bms->decision = family_decide(&bms->family, &calibration->family, &calibration->rcbf,
-                                      &reading, wanted_current_A(bms));
+                                      &reading, bms_wanted_current_A(bms));
         bms->state = (bms->decision.active == RCBF_NONE) ? BMS_CHARGING : BMS_DERATED;
     } else if (is_charging(bms)) {
         const rcbf_input_t input = {
@@ -224,7 +182,7 @@ static void decide(bms_t *bms)
             .surface_temperature_K = { .high_K = bms->surface_temperature_K },
             .coolant_temperature_K = { .high_K = m->coolant_temperature_K },
             .cooling_power_W = m->cooling_power_W,
-            .reference_current_A = wanted_current_A(bms),
+            .reference_current_A = bms_wanted_current_A(bms),
         };
         bms->decision = rcbf_solve_steadily(&calibration->rcbf, &input,
                                             rcbf_open_circuit_voltage_V(&calibration->rcbf,
@@ -265,7 +223,7 @@ static void run_period(bms_t *bms)
     }
     const bool may_charge = is_charging(bms) && !bms->monitor.stop && bms->decision.feasible;
     bms->command_A = may_charge ? bms->decision.current_A : 0.0f;
-    follow_growth(bms);
+    bms_follow_growth(bms);
 }
 
 static void queue_frames(bms_t *bms)

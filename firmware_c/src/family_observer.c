@@ -1,6 +1,6 @@
 #include "family.h"
 
-#include <math.h>
+#include <float.h>
 
 #include "family_tables.h"
 #include "numeric.h"
@@ -43,55 +43,6 @@ void family_reset(family_t *family, const family_constants_t *constants)
             family_greatest(constants->entropic_V_per_K, 0u, FAMILY_SOC_CELLS),
     };
     forget_core(family);
-}
-
-/* Greatest or least state of charge whose open-circuit voltage may be this one. */
-static float soc_at(const rcbf_constants_t *cell, float voltage_V)
-{
-    const uint32_t last = cell->ocv_points - 1u;
-    const float clamped = numeric_clamp(voltage_V, cell->ocv_V[0], cell->ocv_V[last]);
-    const uint32_t segment = numeric_segment(cell->ocv_V, cell->ocv_points, clamped);
-    const float *at_V = &cell->ocv_V[segment];
-    const float *at = &cell->ocv_soc[segment];
-    const float share = (clamped - at_V[0]) / (at_V[1] - at_V[0]);
-    return at[0] + share * (at[1] - at[0]);
-}
-
-static bool is_at_rest(const family_constants_t *constants, const family_reading_t *reading)
-{
-    return numeric_abs(reading->current_A) <= 2.0f * constants->current_error_A;
-}
-
-void family_begin(family_t *family, const family_constants_t *constants,
-                  const rcbf_constants_t *cell, float plug_in_soc,
-                  const family_reading_t *reading)
-{
-    const float told_low = numeric_clamp(plug_in_soc - constants->plug_in_error, 0.0f, 1.0f);
-    const float told_high = numeric_clamp(plug_in_soc + constants->plug_in_error, 0.0f, 1.0f);
-    float low = told_low;
-    float high = told_high;
-    if (is_at_rest(constants, reading)) {
-        /* A charge that has just ended has left polarisation as well, which does not lower the
-         * voltage. */
-        const float error_V = constants->voltage_error_V + constants->ocv_error_V +
-                              constants->rest_polarisation_V +
-                              3.0f * constants->current_error_A * constants->resistance_ohm[0];
-        const float seen_low =
-            soc_at(cell, reading->voltage_V - error_V - family->polarisation_V);
-        const float seen_high = soc_at(cell, reading->voltage_V + error_V);
-        low = numeric_larger(told_low, seen_low);
-        high = numeric_smaller(told_high, seen_high);
-        if (low > high) {
-            /* One of both is wrong; nobody knows which. */
-            low = numeric_smaller(told_low, seen_low);
-            high = numeric_larger(told_high, seen_high);
-        }
-    }
-    family->soc_low = (soc_counter_t){ low, 0.0f };
-    family->soc_high = (soc_counter_t){ high, 0.0f };
-    family->soc_known = true;
-    family->rest_polarisation_V = constants->rest_polarisation_V;
-    family->full_count = 0u;
 }
 
 NUMERIC_INLINE void follow_supply(family_t *family, const family_constants_t *constants,
@@ -312,7 +263,7 @@ void family_observe(family_t *family, const family_constants_t *constants,
     follow_polarisation(family, constants, &branches, heat.at_least_A);
     look_for_full(family, constants, reading, heat.at_most_A);
     steady_voltage(family, constants, reading->voltage_V, strength_A);
-    const bool rests = is_at_rest(constants, reading);
+    const bool rests = family_is_at_rest(constants, reading);
     if (!rests && !reading->is_charging) {
         forget_after_load(family, constants);
         return;

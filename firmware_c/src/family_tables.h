@@ -54,6 +54,9 @@ float family_measured_strength_A(const family_heat_t *heat, float square, float 
 float family_assumed_strength_A(const family_heat_t *heat, float square, float slope,
                                 float limit_W);
 
+/* Whether a reading of the current is none but for its error. */
+bool family_is_at_rest(const family_constants_t *constants, const family_reading_t *reading);
+
 /* Take one more reading at rest, or in a charge, into the bound on the core. */
 void family_look_at_rest(family_t *family, const family_constants_t *constants,
                          const rcbf_constants_t *cell, const family_reading_t *reading);

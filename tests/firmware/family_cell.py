@@ -26,8 +26,8 @@ SUB_STEPS = 4
 SOURCES = [
     FIRMWARE / "src" / f"{name}.c"
     for name in (
-        *("rcbf", "soc", "family_tables", "family_observer", "family_plausibility"),
-        *("family_windows", "family_decision"),
+        *("rcbf", "soc", "family_tables", "family_begin", "family_observer"),
+        *("family_plausibility", "family_windows", "family_decision"),
     )
 ]
 HEADERS = ["include/rcbf.h", "include/soc.h", "include/family.h", "src/family_tables.h"]

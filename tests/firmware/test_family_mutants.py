@@ -123,10 +123,11 @@ class Mutant:
     claim: str
 
 
-OBSERVER, DECISION, TABLES = "family_observer.c", "family_decision.c", "family_tables.c"
+BEGIN, OBSERVER = "family_begin.c", "family_observer.c"
+DECISION, TABLES = "family_decision.c", "family_tables.c"
 MUTANTS = [
-    Mutant(OBSERVER, "if (is_at_rest(constants, reading)) {\n        /* A charge", "if (true) {\n        /* A charge", "toggled", "full is full"),
-    Mutant(OBSERVER, " - error_V - family->polarisation_V", " - error_V", "paused", "charge is no less"),
+    Mutant(BEGIN, "if (family_is_at_rest(constants, reading)) {\n        /* A charge", "if (true) {\n        /* A charge", "toggled", "full is full"),
+    Mutant(BEGIN, " - error_V - family->polarisation_V", " - error_V", "paused", "charge is no less"),
     Mutant(OBSERVER, "smaller(family->core_room_K, surface_room_K);", "family->core_room_K;", "warm coolant", "core is no hotter"),
     Mutant(OBSERVER, "? constants->heating_K_per_W :", "? constants->cooling_K_per_W :", "hot charge", "core is no hotter"),
     Mutant(OBSERVER, "family->resistance_ohm * at_most_A -\n        family->polarisation_V", "family->resistance_ohm * at_most_A", "told too much", "full is full"),
