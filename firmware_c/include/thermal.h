@@ -38,6 +38,9 @@ void thermal_reset(thermal_t *thermal);
 void thermal_step(thermal_t *thermal, const thermal_constants_t *constants, float current_A,
                   float surface_temperature_K, float coolant_temperature_K);
 
+/* What the heat makes of the surface; far below any reading before the first step. */
+float thermal_predicted_surface_K(const thermal_t *thermal);
+
 /* Coldest that the surface can be; far below any reading before the first step. */
 float thermal_coldest_surface_K(const thermal_t *thermal, const thermal_constants_t *constants);
 

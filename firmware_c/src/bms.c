@@ -42,8 +42,10 @@ void bms_receive(bms_t *bms, const can_frame_t *frame)
     network_receive(&bms->network, frame, &bms->measurement);
 }
 
-/* A sensor that is stuck or has come off reads colder than the heat allows; what the heat allows
- * then stands in for it, until the monitor sees the deficit. */
+/* A sensor that is stuck, drifts or has come off reads colder than the heat allows, and so low a
+ * reading is not believed, until the monitor sees the deficit. Of one cell it is not believed below
+ * what the heat makes of that cell, so that the lie is no more than the prediction's error; of a
+ * family not below its coldest cell. */
 static void update_surface_temperature(bms_t *bms, float current_A, bool is_surface_usable)
 {
     const codec_measurement_t *m = &bms->measurement;
@@ -52,10 +54,11 @@ static void update_surface_temperature(bms_t *bms, float current_A, bool is_surf
     if (bms->thermal.is_known || is_surface_usable) {
         thermal_step(&bms->thermal, &calibration->thermal, current_A, m->surface_temperature_K,
                      bms->coolant_temperature_K);
-        const float coldest_K =
-            thermal_coldest_surface_K(&bms->thermal, &calibration->thermal);
-        if (bms->surface_temperature_K < coldest_K) {
-            bms->surface_temperature_K = coldest_K;
+        const float least_K =
+            has_family(bms) ? thermal_coldest_surface_K(&bms->thermal, &calibration->thermal)
+                            : thermal_predicted_surface_K(&bms->thermal);
+        if (bms->surface_temperature_K < least_K) {
+            bms->surface_temperature_K = least_K;
         }
     }
 }

@@ -80,6 +80,8 @@ static uint32_t symptoms_of_readings(const bms_t *bms)
     const bool coolant = is_usable(bms, CAN_RECEIVED_COOLANT);
     const float surface_limit_K =
         cell->max_surface_temperature_K.high_K + limits->temperature_overshoot_K;
+    const float coldest_surface_K =
+        thermal_coldest_surface_K(&bms->thermal, &bms->calibration->thermal);
 
     return bit_if(electrical && is_outside(m->current_A, &limits->current_A),
                   FAULT_CURRENT_RANGE) |
@@ -106,7 +108,7 @@ static uint32_t symptoms_of_readings(const bms_t *bms)
            bit_if(thermal && core_is_too_hot(bms), FAULT_CORE_OVER_TEMPERATURE) |
            bit_if(thermal && (m->surface_temperature_K > surface_limit_K),
                   FAULT_SURFACE_OVER_TEMPERATURE) |
-           bit_if(thermal && (bms->surface_temperature_K - m->surface_temperature_K >
+           bit_if(thermal && (coldest_surface_K - m->surface_temperature_K >
                               limits->surface_deficit_K),
                   FAULT_SURFACE_DEFICIT);
 }

@@ -42,10 +42,12 @@ void thermal_step(thermal_t *thermal, const thermal_constants_t *constants, floa
                               constants->gain_coolant[1] * coolant_rise_K;
 }
 
+float thermal_predicted_surface_K(const thermal_t *thermal)
+{
+    return thermal->is_known ? (thermal->start_K + thermal->surface_rise_K) : -FLT_MAX;
+}
+
 float thermal_coldest_surface_K(const thermal_t *thermal, const thermal_constants_t *constants)
 {
-    if (!thermal->is_known) {
-        return -FLT_MAX;
-    }
-    return (thermal->start_K + thermal->surface_rise_K) - constants->error_bound_K;
+    return thermal_predicted_surface_K(thermal) - constants->error_bound_K;
 }
