@@ -84,6 +84,7 @@ MUTANTS = [
     Mutant("a steadied condition is no more than the reading's", "rcbf.c", "if (!(*kept <= f->constant))", "if (!(*kept <= f->constant + margin))", SMOOTH, "no_stronger"),
     Mutant("a steadied condition gives way after no number", "rcbf.c", "if (!(*kept <= f->constant))", "if (*kept > f->constant)", SMOOTH, "no_number"),
     Mutant("a steadied voltage is no less than the reading", "family_observer.c", "if (!(steady_V >= read_V))", "if (steady_V != steady_V)", SMOOTH, "believes_no_less"),
+    Mutant("a reading below the prediction is not believed", "bms.c", ": thermal_predicted_surface_K(&bms->thermal)", ": thermal_coldest_surface_K(&bms->thermal, &calibration->thermal)", "tests/hil_sim/test_surface_sensor.py", "slow_drift"),
     Mutant("a charge needs the edge", "bms.c", "bms->may_start && (symptoms", "(symptoms", STATES, "edge"),
     Mutant("a charge ends when complete", "bms.c", "bms->state = BMS_COMPLETE;", "bms->state = BMS_CHARGING;", STATES, "complete"),
     Mutant("the command is counted too", "soc.c", "? state->commanded.soc", "? state->measured.soc", STATES, "counted"),
