@@ -225,8 +225,8 @@ static void run_period(bms_t *bms)
         bms->state = BMS_FAULT;
     }
     const bool may_charge = is_charging(bms) && !bms->monitor.stop && bms->decision.feasible;
-    bms->command_A = may_charge ? bms->decision.current_A : 0.0f;
     bms_follow_growth(bms);
+    bms->command_A = may_charge ? bms->decision.current_A : 0.0f;
 }
 
 static void queue_frames(bms_t *bms)

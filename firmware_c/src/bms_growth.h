@@ -9,7 +9,10 @@
  * is the greater number. */
 float bms_wanted_current_A(const bms_t *bms);
 
-/* What a limit allows jitters with the noise of the readings. The current obeys each fall at once,
+/* Takes a decision that is about to be the command. A charge begins with the preset's growth, until it
+ * has come to what was asked for; then no step is larger than somebody would notice.
+ *
+ * What a limit allows jitters with the noise of the readings. The current obeys each fall at once,
  * and so stays on the lower side of that jitter if it rises slowly: where a limit was met it begins
  * anew with a small growth, and grows faster the longer none is. Until then that limit is the one
  * that holds it back. */

@@ -24,7 +24,7 @@
 /* Of the way to the present reading that a steadied condition goes in a period, and what it keeps
  * below it on average, as a share of the margin; that much noise does not move it at once. */
 #define STEADY_SHARE 0.2f
-#define STEADY_RESERVE 0.25f
+#define STEADY_RESERVE 0.125f
 
 /* constant + linear u >= 0 with linear > 0 */
 typedef struct {

@@ -167,6 +167,21 @@ def test_a_family_believes_no_less_voltage_than_was_read() -> None:
         assert steadied_A >= core.decide(reading, -23.0)
 
 
+def test_a_charge_begins_with_the_presets_growth_and_follows_later_requests_gently() -> None:
+    bench = Bench()
+    growth_A = bench.ecu.preset.limits.current_growth_A_per_s * 0.1
+    bench.get_ready(ReferenceCurrent=-5.0)
+    rises_A = []
+    for reference_A, periods in ((-5.0, 30), (-15.0, 90)):
+        for _ in range(periods):
+            before_A = bench.command_A
+            bench.period(Request=1, ReferenceCurrent=reference_A)
+            rises_A.append(before_A - bench.command_A)
+        assert bench.command_A == pytest.approx(reference_A, abs=0.0021)
+    assert max(rises_A[:30]) == pytest.approx(growth_A, abs=0.0021)
+    assert max(rises_A[30:]) == pytest.approx(0.006 * 23.0, abs=0.0021)
+
+
 def test_current_falls_at_once_and_rises_slowly_where_a_limit_was_met() -> None:
     bench = Bench()
     bench.start_at_full_current()
@@ -174,7 +189,7 @@ def test_current_falls_at_once_and_rises_slowly_where_a_limit_was_met() -> None:
     met_A = bench.command_A
     assert bench.state == "Derated"
     assert met_A == pytest.approx(bench.answer["LowerCurrent"], abs=0.0021)
-    most_A = bench.ecu.preset.limits.current_growth_A_per_s * 0.1
+    most_A = -0.006 * bench.ecu.preset.limits.reference_current_A
     rises_A = []
     for _ in range(100):
         before_A = bench.command_A
