@@ -20,6 +20,7 @@ READY_PERIODS = 3
 """Good periods that make a message valid."""
 STATES = ("Init", "Standby", "Charging", "Derated", "Complete", "Fault")
 
+
 class StepwiseEcu(Ecu):
     """An ECU whose periods go by `receive`, `step` and `transmit`, which a test may replace."""
 

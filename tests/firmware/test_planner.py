@@ -112,7 +112,9 @@ class NoisyEcu(StepwiseEcu):
 @pytest.mark.parametrize(("preset", "start_K"), [(PAPER, 317.0), (LIN, 317.0)])
 def test_with_noise_for_a_plan_every_limit_is_kept(preset: str, start_K: float) -> None:
     settings = replace(starting_at(preset, start_K), mode=Mode.FASTEST, max_time_s=400.0)
-    noisy = run_both(settings, ecu_factory=lambda plant, database: NoisyEcu(preset)).summary
+    ecu = NoisyEcu(preset)
+    noisy = run_both(settings, ecu_factory=lambda plant, database: ecu).summary
+    assert ecu.periods > 1000
     assert (noisy.limits_kept, noisy.first_fault) == (True, None)
     assert noisy.final_soc > settings.preset.initial.soc + 0.02, "it did charge"
 
