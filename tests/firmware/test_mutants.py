@@ -45,7 +45,7 @@ MUTANTS = [
     Mutant("core margin is subtracted", "rcbf.c", " + k->core_margin_K_per_s)", ")", DECISION, MARGINS),
     Mutant("surface margin counts", "rcbf.c", " + k->surface_margin_K_per_s2)", ")", DECISION, MARGINS),
     Mutant("estimation error is taken at its worst", "rcbf.c", "f->mean.constant + f->rest", "f->mean.constant - f->rest", DECISION, MARGINS),
-    Mutant("temperatures are finer than float32", "rcbf.c", " + (a.low_K - b.low_K)", "", DECISION, "slsqp or osqp"),
+    Mutant("temperatures are finer than float32", "rcbf.c", " + (a.low_K - b.low_K)", "", DECISION, "more_digits"),
     Mutant("voltage limit decides", "rcbf.c", "k->max_voltage_V - open_circuit", "k->max_voltage_V + open_circuit", DECISION, MARGINS),
     Mutant("an empty interval gives 0 A", "rcbf.c", "decision.feasible ? interval.lower_A : 0.0f", "interval.lower_A", DECISION, "infeasible"),
     Mutant("a constraint that may decide is solved", "rcbf.c", "#define CLEARLY 1e-5f", "#define CLEARLY -1e-2f", DECISION, "just_decides"),
