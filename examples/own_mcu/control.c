@@ -58,7 +58,7 @@ float control_step(control_t *control, const control_readings_t *now, float want
         .surface_temperature_K = { .high_K = now->surface_temperature_K },
         .coolant_temperature_K = { .high_K = now->coolant_temperature_K },
         .cooling_power_W = now->cooling_power_W,
-        .soc = control->soc.soc,
+        .soc = control->soc.soc + cell->soc_error,
         .reference_current_A = (wanted_A < allowed_A) ? allowed_A : wanted_A,
     };
     control->decision = rcbf_solve(&cell->rcbf, &input);

@@ -50,11 +50,22 @@ def files_below(folder: Path) -> dict[str, bytes]:
 
 
 def rows_to_try(count: int) -> npt.NDArray[np.float32]:
-    """States in and around the operating range, and numbers that are none or not physical."""
+    """States in and around the operating range, and numbers that are none or not physical.
+
+    Some are full but for the last percent, and some have a surface at its limit beside hotter
+    coolant: there the constraints decide that elsewhere leave more than the others.
+    """
     random = np.random.default_rng(11)
-    low = [-25.0, -0.5, 275.0, 270.0, -0.1, 275.0, 275.0, 270.0, -0.5, -25.0]
-    high = [1.0, 1.5, 330.0, 328.0, 1.1, 330.0, 330.0, 328.0, 1.5, 0.5]
-    rows = random.uniform(low, high, (count, len(low))).astype(np.float32)
+    low = np.array([-25.0, -0.5, 275.0, 270.0, -0.1, 275.0, 275.0, 270.0, -0.5, -25.0])
+    high = np.array([1.0, 1.5, 330.0, 328.0, 1.1, 330.0, 330.0, 328.0, 1.5, 0.5])
+    rows = random.uniform(low, high, (count, len(low)))
+    decision = slice(4, 10)
+    nearly_full = [0.99, 295.0, 290.0, 290.0, 0.0, -23.0], [1.0, 305.0, 305.0, 300.0, 1.0, -20.0]
+    hot_surface = [0.2, 290.0, 322.2, 334.0, 0.0, -23.0], [0.8, 322.0, 322.7, 340.0, 1.0, -10.0]
+    for first, (least, most) in enumerate((nearly_full, hot_surface)):
+        part = rows[first::10, decision]
+        part[:] = random.uniform(least, most, part.shape)
+    rows = rows.astype(np.float32)
     odd = np.array([np.nan, np.inf, -np.inf, 3e38, -3e38, 0.0, 1e-42], np.float32)
     places = random.random(rows.shape) < 0.02
     rows[places] = random.choice(odd, np.count_nonzero(places))

@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 from cffi import FFI
 
+from bms.barrier.margins import sampling_margins
+from bms.barrier.readings import soc_error_bound
 from bms.native_build import CORE_HEADERS, ROOT
 from bms.presets import load_preset
 from tests.codegen.cmake import needs_cmake
@@ -34,7 +36,7 @@ RIGHT_CHOICE = "(wanted_A < allowed_A) ? allowed_A : wanted_A"
 WRONG_CHOICE = "(wanted_A > allowed_A) ? wanted_A : allowed_A"
 UNLIKE_THE_TRAINING = {"surface_temperature_K": 316.0, "coolant_temperature_K": 274.0}
 NO_FAULT, SURFACE_RANGE, OUT_OF_DOMAIN, OVER_VOLTAGE = 255, 6, 10, 13
-NONE, SOC, CORE_LIMIT, INVALID = 0, 2, 3, 6
+NONE, VOLTAGE, CORE_LIMIT, INVALID = 0, 1, 3, 6
 
 
 def load_control(out: Path, change: tuple[str, str] | None = None) -> tuple[FFI, Any]:
@@ -220,7 +222,7 @@ def test_each_state_gets_the_decision_that_it_calls_for(on_host: list[str]) -> N
         "cold and empty": (NONE, NO_FAULT),
         "warm": (NONE, NO_FAULT),
         "core near its limit": (CORE_LIMIT, NO_FAULT),
-        "nearly full": (SOC, NO_FAULT),
+        "nearly full": (VOLTAGE, NO_FAULT),
         "unlike the training": (NONE, OUT_OF_DOMAIN),
         "broken sensor": (INVALID, SURFACE_RANGE),
     }
@@ -228,6 +230,14 @@ def test_each_state_gets_the_decision_that_it_calls_for(on_host: list[str]) -> N
     assert current_A["cold and empty"] == pytest.approx(20.0 * GROWTH_A, rel=1e-6)
     assert current_A["warm"] == STRONGEST_A
     assert STRONGEST_A < current_A["core near its limit"] < -15.0
+    soc = float(rows["nearly full"]["soc"]) + soc_error_bound(PRESET.cell, PRESET)
+    left_V = (
+        PRESET.limits.max_voltage_V
+        - sampling_margins(PRESET.cell, PRESET).voltage_V
+        - float(PRESET.cell.ocv(soc))
+    )
+    strongest_A = left_V / PRESET.cell.ohmic_resistance_ohm
+    assert current_A["nearly full"] == pytest.approx(-strongest_A, abs=1e-3)
     assert current_A["unlike the training"] == current_A["broken sensor"] == 0.0
     soc = float(rows["warm"]["soc"])
     assert 0.40 + 2.0 * 20.0 / 8280.0 < soc < 0.40 + 2.0 * 23.0 / 8280.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +19,18 @@ RECEIVED = (*MEASURED, "ChargeMode")
 READY_PERIODS = 3
 """Good periods that make a message valid."""
 STATES = ("Init", "Standby", "Charging", "Derated", "Complete", "Fault")
+
+
+class StepwiseEcu(Ecu):
+    """An ECU whose periods go by `receive`, `step` and `transmit`, which a test may replace."""
+
+    def exchange(self, frames: Sequence[tuple[int, bytes]]) -> list[tuple[int, bytes]]:
+        """A control period by the calls that a subclass replaces."""
+        for frame_id, data in frames:
+            self.receive(frame_id, data)
+        self.step()
+        return self.transmit()
+
 
 HEALTHY: dict[str, float] = {
     "Current": 0.0,

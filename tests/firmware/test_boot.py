@@ -157,7 +157,7 @@ def test_what_is_in_order_is_started(tmp_path: Path) -> None:
     with Emulation(put(image(), tmp_path), BOARD) as board, open_bus(board.bus) as bus:
         assert bus.receive(SILENCE_S) is None, "the application waits for a first frame"
         bus.send(Frame(CODECS["SYNC"].frame_id, b""))
-        answer = [bus.receive(ANSWER_TIMEOUT_S) for _ in range(8)]
+        answer = [bus.receive(ANSWER_TIMEOUT_S) for _ in range(9)]
     assert answer[-1] is not None and answer[-1].frame_id == CODECS["ChargeCommand"].frame_id
     identity = CODECS["Identity"].decode(answer[4].data) if answer[4] else {}
     assert identity["FirmwareVersion"] == lib.BMS_FIRMWARE_VERSION

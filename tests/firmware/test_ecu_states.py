@@ -8,7 +8,8 @@ import pytest
 
 from bms.firmware._firmware import lib
 from codegen.can_database import network_version
-from tests.firmware.bench import DATABASE, READY_PERIODS, RECEIVED, STATES, Bench, frame
+from hil_sim.bus.catalog import Mode
+from tests.firmware.bench import DATABASE, HEALTHY, READY_PERIODS, RECEIVED, STATES, Bench, frame
 
 
 def test_before_all_measurements_came_it_stays_in_init_at_zero() -> None:
@@ -116,9 +117,12 @@ def test_without_a_safe_current_it_commands_zero_and_says_infeasible() -> None:
     assert bench.state == "Derated"
 
 
+@pytest.mark.parametrize("mode", [Mode.FASTEST, Mode.FIXED])
 @pytest.mark.parametrize(("asked_A", "given_A"), [(-60.0, -23.0), (-5.0, -5.0), (0.0, 0.0)])
-def test_reference_is_followed_but_never_beyond_the_preset(asked_A: float, given_A: float) -> None:
-    bench = Bench()
+def test_reference_is_followed_but_never_beyond_the_preset(
+    asked_A: float, given_A: float, mode: Mode
+) -> None:
+    bench = Bench(values={**HEALTHY, "Mode": float(mode)})
     bench.start_at_full_current(ReferenceCurrent=asked_A)
     assert bench.command_A == pytest.approx(given_A, abs=0.0021)
 

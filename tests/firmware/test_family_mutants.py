@@ -128,7 +128,7 @@ DECISION, TABLES = "family_decision.c", "family_tables.c"
 MUTANTS = [
     Mutant(BEGIN, "if (family_is_at_rest(constants, reading)) {\n        /* A charge", "if (true) {\n        /* A charge", "toggled", "full is full"),
     Mutant(BEGIN, " - error_V - family->polarisation_V", " - error_V", "paused", "charge is no less"),
-    Mutant(OBSERVER, "smaller(family->core_room_K, surface_room_K);", "family->core_room_K;", "warm coolant", "core is no hotter"),
+    Mutant(OBSERVER, "numeric_smaller(family->core_room_K, surface_room_K);", "family->core_room_K;", "warm coolant", "core is no hotter"),
     Mutant(OBSERVER, "? constants->heating_K_per_W :", "? constants->cooling_K_per_W :", "hot charge", "core is no hotter"),
     Mutant(OBSERVER, "family->resistance_ohm * at_most_A -\n        family->polarisation_V", "family->resistance_ohm * at_most_A", "told too much", "full is full"),
     Mutant(OBSERVER, "- family->resistance_ohm * at_most_A", "- constants->least_resistance_ohm * at_most_A", "told too much", "full is full"),
@@ -136,7 +136,7 @@ MUTANTS = [
     Mutant(OBSERVER, "least_A * constants->least_soc_per_A", "most_A * constants->greatest_soc_per_A", "told too much", "charge is no less"),
     Mutant(OBSERVER, "soc_add(&family->soc_high, strength_A * constants->greatest_soc_per_A);", "", "lost", "charge is no more"),
     Mutant("family_windows.c", " * constants->per_surface_rise +", " * 0.0f +", "hot inside", "core is no hotter"),
-    Mutant(DECISION, "- constants->voltage_error_V - drifting_V;", "+ 0.01f;", "top", "voltage"),
+    Mutant(DECISION, "- constants->voltage_error_V - above_reading_V;", "+ 0.01f;", "top", "voltage"),
     Mutant(DECISION, "const float current_A = -allowed_A / factor;", "const float current_A = -allowed_A;", "cold", "voltage"),
     Mutant(TABLES, "return past_A * heat->overpotential_V +", "return 0.8f * past_A * heat->overpotential_V +", "hot charge", "core is no hotter"),
     Mutant(OBSERVER, "    family->core_room_K -=\n        ((net_W", "    family->core_room_K -=\n        0.0f * ((net_W", "new and hot", "core is no hotter"),

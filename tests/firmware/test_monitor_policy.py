@@ -11,7 +11,8 @@ import pytest
 from tests.firmware.native_library import FIRMWARE, load_library
 
 Native = tuple[Any, Any]
-FAULTS, MOST_PERIODS, NONE = 20, 255, 255
+FAULTS, MOST_PERIODS, NONE = 21, 255, 255
+POLICY = f"extern const fault_policy_t MONITOR_POLICY[{FAULTS}];"
 SHARES = (0.01, 0.2, 0.6)
 
 
@@ -21,7 +22,7 @@ def native(tmp_path_factory: pytest.TempPathFactory) -> Native:
         tmp_path_factory.mktemp("monitor"),
         [FIRMWARE / "src" / "monitor.c"],
         ["include/monitor.h"],
-        extra="extern const fault_policy_t MONITOR_POLICY[20];",
+        extra=POLICY,
     )
 
 
@@ -115,7 +116,7 @@ def test_a_wrong_short_way_is_noticed(
         [FIRMWARE / "src" / "monitor.c"],
         ["include/monitor.h"],
         ("monitor.c", *change),
-        extra="extern const fault_policy_t MONITOR_POLICY[20];",
+        extra=POLICY,
     )
     with pytest.raises(AssertionError):
         test_a_symptom_stops_as_its_row_says(broken)

@@ -16,7 +16,7 @@ from bms.firmware._firmware import ffi, lib
 from bms.presets import load_preset
 from hil_sim.bus.catalog import Mode
 from hil_sim.run.session import run_both
-from tests.firmware.bench import HEALTHY, Bench
+from tests.firmware.bench import HEALTHY, Bench, StepwiseEcu
 from tests.firmware.planned_charge import charge, starting_at, time_s
 
 PAPER, LIN = "paper_calibrated", "lin2014"
@@ -90,13 +90,17 @@ def test_a_time_that_cannot_be_kept_gives_the_fastest_charge() -> None:
 NOT_FINITE = [math.nan, math.inf, -math.inf]
 
 
-class NoisyEcu(Ecu):
+class NoisyEcu(StepwiseEcu):
     """An ECU whose plan is noise, another in every period, numbers that are none among it."""
 
-    rng = random.Random(14)
+    def __init__(self, preset: str) -> None:
+        super().__init__(preset)
+        self.rng = random.Random(14)
+        self.periods = 0
 
     def step(self) -> None:
         """Run one control period."""
+        self.periods += 1
         planner = self._state.planner
         planner.is_searching, planner.age_s = False, 0.0
         planner.planned_A = self.rng.choice(
@@ -108,7 +112,9 @@ class NoisyEcu(Ecu):
 @pytest.mark.parametrize(("preset", "start_K"), [(PAPER, 317.0), (LIN, 317.0)])
 def test_with_noise_for_a_plan_every_limit_is_kept(preset: str, start_K: float) -> None:
     settings = replace(starting_at(preset, start_K), mode=Mode.FASTEST, max_time_s=400.0)
-    noisy = run_both(settings, ecu_factory=lambda plant, database: NoisyEcu(preset)).summary
+    ecu = NoisyEcu(preset)
+    noisy = run_both(settings, ecu_factory=lambda plant, database: ecu).summary
+    assert ecu.periods > 1000
     assert (noisy.limits_kept, noisy.first_fault) == (True, None)
     assert noisy.final_soc > settings.preset.initial.soc + 0.02, "it did charge"
 

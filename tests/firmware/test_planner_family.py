@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from bms.firmware import Ecu
 from bms.presets import load_preset
 from hil_sim.bus.catalog import Mode
 from hil_sim.plant.true_cell import nominal_cell
 from hil_sim.run.result import RunResult
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import Settings
-from tests.firmware.bench import DATABASE, HEALTHY, Bench, frame
+from tests.firmware.bench import DATABASE, HEALTHY, Bench, StepwiseEcu, frame
 from tests.firmware.planned_charge import time_s
 
 PRESET = load_preset("a123_26650_10C")
@@ -48,11 +47,11 @@ def test_a_family_is_full_in_time_though_its_count_ends_early(told: float, suppl
 
 
 def test_the_fastest_charge_of_a_family_is_no_slower_than_the_fixed_one() -> None:
-    fixed_s = time_s(charge(None, None, *WRONGLY_PLUGGED_IN))
+    fixed_s = time_s(charge(Mode.FIXED, None, *WRONGLY_PLUGGED_IN))
     assert time_s(charge(Mode.FASTEST, None, *WRONGLY_PLUGGED_IN)) <= fixed_s + 1.0
 
 
-class Pausing(Ecu):
+class Pausing(StepwiseEcu):
     """Hears from second 60 to 64 that no charge is asked for, and remembers its plans."""
 
     def __init__(self) -> None:

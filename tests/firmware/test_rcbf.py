@@ -120,6 +120,24 @@ def test_decision_equals_slsqp_on_the_raw_constraints(firmware: Firmware) -> Non
     assert checked > STATES / 4
 
 
+def test_a_temperature_counts_with_more_digits_than_float32_has(paper_firmware: Firmware) -> None:
+    """Where the current depends much on them, rounded ones would cost or give milliamperes."""
+    lost_A = 0.0
+    for state in random_states(8, 6_000):
+        reference_A = state["reference_current_A"]
+        lower_A, upper_A = interval(quadratics(paper_firmware.parameters, state), reference_A)
+        if lower_A > upper_A - 1e-4:
+            continue
+        assert solve(paper_firmware, state).current_A == pytest.approx(lower_A, abs=2e-4), state
+        rounded = {
+            name: float(np.float32(given)) if name.endswith("_K") else given
+            for name, given in state.items()
+        }
+        of_rounded = interval(quadratics(paper_firmware.parameters, rounded), reference_A)
+        lost_A = max(lost_A, abs(of_rounded[0] - lower_A))
+    assert lost_A > 1e-3
+
+
 def test_infeasible_states_give_zero_and_say_so(firmware: Firmware) -> None:
     infeasible = 0
     for state in random_states(3, STATES):

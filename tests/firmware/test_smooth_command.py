@@ -185,8 +185,10 @@ def test_a_charge_begins_with_the_presets_growth_and_follows_later_requests_gent
 def test_current_falls_at_once_and_rises_slowly_where_a_limit_was_met() -> None:
     bench = Bench()
     bench.start_at_full_current()
-    bench.period(SurfaceTemperature=318.0, CoolantTemperature=312.0)
+    # So hot that the way back is long enough for the rise to become as fast as it may.
+    bench.period(SurfaceTemperature=319.0, CoolantTemperature=312.0)
     met_A = bench.command_A
+    assert -8.0 < met_A < 0.0
     assert bench.state == "Derated"
     assert met_A == pytest.approx(bench.answer["LowerCurrent"], abs=0.0021)
     most_A = -0.006 * bench.ecu.preset.limits.reference_current_A
