@@ -21,7 +21,7 @@ from bms.presets import load_preset
 from hil_sim.bus.catalog import Mode
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import Settings
-from tests.firmware.bench import Bench
+from tests.firmware.bench import HEALTHY, Bench
 
 LARGEST_RMS_A, LARGEST_STEP_A = 0.03, 0.15
 PERIODS = 60
@@ -168,7 +168,7 @@ def test_a_family_believes_no_less_voltage_than_was_read() -> None:
 
 
 def test_a_charge_begins_with_the_presets_growth_and_follows_later_requests_gently() -> None:
-    bench = Bench()
+    bench = Bench(values={**HEALTHY, "Mode": int(Mode.FIXED)})
     growth_A = bench.ecu.preset.limits.current_growth_A_per_s * 0.1
     bench.get_ready(ReferenceCurrent=-5.0)
     rises_A = []
@@ -198,5 +198,5 @@ def test_current_falls_at_once_and_rises_slowly_where_a_limit_was_met() -> None:
         bench.period(SurfaceTemperature=312.0, CoolantTemperature=306.0)
         rises_A.append(before_A - bench.command_A)
         assert rises_A[-1] <= most_A + 0.0021
-    assert max(rises_A[:8]) <= 0.15 * most_A
+    assert max(rises_A[:8]) <= 0.4 * most_A
     assert max(rises_A) >= 0.9 * most_A
