@@ -35,7 +35,9 @@ MAIN = "from bms.cli import main; main()"
 PATIENCE_S = 120.0
 BUS = "udp_multicast:239.74.163.89"
 
-EXTRAS = {"plating": "pybamm", "optimum": "cvxpy"}
+EXTRAS = {
+    "plating": "pybamm", "optimum": "cvxpy", "compare-charges": "cvxpy", "tune": "cvxpy",
+}  # fmt: skip
 Started = subprocess.Popen[bytes]
 
 COMMANDS: dict[str, tuple[int, str]] = {
@@ -54,6 +56,8 @@ COMMANDS: dict[str, tuple[int, str]] = {
     "export": (0, "--preset lin2014 --out DIR/out"),
     "train": (0, "--data DIR/run.csv --lagged --out DIR/model.json"),
     "optimum": (0, "--preset lin2014 --samples 20 --no-ramp --out DIR/out"),
+    "compare-charges": (1, "--what family --runs 1 --jobs 1 --out DIR/out"),
+    "tune": (0, "--preset lin2014 --gap"),
     "evaluate": (0, "--model MODEL --data DIR/run.csv"),
     "explain": (0, "--model MODEL --data DIR/run.csv --out DIR/out"),
     "bound": (1, "--model MODEL --data DIR/run.csv --out DIR/out"),

@@ -223,10 +223,10 @@ def test_edited_model_is_told_the_command_for_its_preset(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("line", "wrong", "named"),
     [
-        ("alpha3_per_s2 = 0.05", "alpha3_per_s2 = 1e-60", "rcbf.alpha3_per_s2 1e-60"),
+        ("alpha3_per_s2 = 0.00512", "alpha3_per_s2 = 1e-60", "rcbf.alpha3_per_s2 1e-60"),
         ("  0.0, 0.01,", "  0.0, 1e-60,", "ocv"),
         (
-            "current_growth_A_per_s = 2.3",
+            "current_growth_A_per_s = 5.0",
             "current_growth_A_per_s = 1e-45",
             "current_growth_A 1e-46",
         ),

@@ -42,8 +42,8 @@ def identify(
         list[Path] | None,
         typer.Option(
             "--data",
-            help="Recording with a measured core (columns as of bms train), or recordings of a "
-            "cycler, CSV or TXT. May be repeated; further files may follow it.",
+            help=f"{options.DATA_HELP} Or, without a measured core, recordings of a cycler, CSV "
+            "or TXT. May be repeated; further files may follow it.",
         ),
     ] = None,
     more: Annotated[

@@ -67,14 +67,11 @@ SimulatedPresetOption = Annotated[str | None, preset_option("Preset to simulate 
 ModelOption = Annotated[Path | None, model_option("Model of the estimator", "the preset's own")]
 RequiredModelOption = Annotated[Path, model_option("Model of the estimator")]
 ModelOutOption = Annotated[Path, typer.Option("--out", help="Model to write (JSON).")]
-DataOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--data",
-        help="CSV with the columns time_s, current_A (negative while charging), cooling_power_W, "
-        "surface_temperature_K, coolant_temperature_K, core_temperature_K; others are ignored.",
-    ),
-]
+DATA_HELP = (
+    "CSV with the columns time_s, current_A (negative while charging), cooling_power_W, "
+    "surface_temperature_K, coolant_temperature_K, core_temperature_K; others are ignored."
+)
+DataOption = Annotated[Path | None, typer.Option("--data", help=DATA_HELP)]
 JsonOption = Annotated[
     bool, typer.Option("--json", help="Print the result as JSON and nothing else.")
 ]

@@ -40,10 +40,13 @@ CURVES = {
 """State of charge and open-circuit voltage (V), as data sheets draw them."""
 
 
-def model_for(preset: Preset, error_bound_K: float = 0.4) -> KanModel:
-    """A shipped network in the place of one trained for the preset: only its error bound counts."""
+def model_for(preset: Preset, error_bound_K: float = 0.4, shipped: str = "lin2014") -> KanModel:
+    """A shipped network in the place of one trained for the preset.
+
+    Only its error bound counts, and that it knows the state in which the preset's charge begins.
+    """
     return replace(
-        _shipped(),
+        _shipped(shipped),
         training_hash=preset.training_hash,
         error_bound_K=error_bound_K,
         error_bound_parts_K={"estimate": error_bound_K},
@@ -52,8 +55,8 @@ def model_for(preset: Preset, error_bound_K: float = 0.4) -> KanModel:
 
 
 @cache
-def _shipped() -> KanModel:
-    return load_shipped_model("lin2014")
+def _shipped(name: str) -> KanModel:
+    return load_shipped_model(name)
 
 
 def other_cells() -> dict[str, Preset]:

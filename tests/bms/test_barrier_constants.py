@@ -28,6 +28,10 @@ ALPHA = sp.symbols("alpha1:5", positive=True)
 SOC_MAX, TC_MAX, TS_MAX = sp.symbols("SoCmax Tcmax Tsmax", positive=True)
 NU = sp.symbols("nu_soc nu_c nu_s nu_inf")
 NU_S_RATE = sp.Symbol("dnu_s")
+ROOTS = sp.symbols("lambda1:3", positive=True)
+"""Rates of the surface's chain: alpha4 is their sum, alpha3 their product."""
+NU_S_BOUND = sp.Symbol("nu_s_bound")
+FORMS = ("paper", "worst-case")
 
 MODEL = (
     -U / CBAT + NU[0],
@@ -46,16 +50,25 @@ def along_model(function):
 
 
 @cache
-def left_sides():
-    """Left-hand sides of the SoC, core and surface constraints for the true state."""
+def left_sides(form):
+    """Left-hand sides of the SoC, core and surface constraints for the true state.
+
+    The paper differentiates the surface's rate with its disturbance in it. In the worst case the
+    first link of the chain has the largest disturbance in its place, which is a constant.
+    """
     soc, core, surface = SOC_MAX - SOC, TC_MAX - TC, TS_MAX - TS
     rate = along_model(surface)
+    link = rate.subs(NU[2], NU_S_BOUND) + ROOTS[0] * surface
+    of_surface = {
+        "paper": along_model(rate) + ALPHA[3] * rate + ALPHA[2] * surface,
+        "worst-case": along_model(link) + ROOTS[1] * link,
+    }
     return tuple(
         sp.expand(side)
         for side in (
             along_model(soc) + ALPHA[0] * soc,
             along_model(core) + ALPHA[1] * core,
-            along_model(rate) + ALPHA[3] * rate + ALPHA[2] * surface,
+            of_surface[form],
         )
     )
 
@@ -63,20 +76,14 @@ def left_sides():
 def coefficient(side, *symbols):
     """Coefficient of a product of symbols, everything else that varies set to zero."""
     product = sp.Mul(*symbols)
-    variables = (TC, TS, TINF, U, QC, *NU, NU_S_RATE)
+    variables = (TC, TS, TINF, U, QC, *NU, NU_S_RATE, NU_S_BOUND)
     return sp.Poly(side, *variables).coeff_monomial(product)
 
 
 @cache
-def derived():
+def derived(form="paper"):
     """The constants by name, read off the derived left-hand sides."""
-    _, core, surface = left_sides()
-    margins = {
-        "core_K_per_s": coefficient(surface, NU[1]),
-        "surface_K_per_s": coefficient(surface, NU[2]),
-        "coolant_K_per_s": coefficient(surface, NU[3]),
-        "surface_rate_K_per_s2": coefficient(surface, NU_S_RATE),
-    }
+    _, core, surface = left_sides(form)
     return {
         "a1_per_s": -coefficient(core, TS),
         "a2_per_As": coefficient(core, TC, U),
@@ -88,12 +95,27 @@ def derived():
         "a8_per_As2": coefficient(surface, TC, U),
         "a9_K_per_A2s2": coefficient(surface, U, U),
         "a10_K_per_Ws2": coefficient(surface, QC),
-    }, margins
+    }
+
+
+@cache
+def disturbed(form):
+    """(bound by name, slope of the surface's side) of all that disturbs it."""
+    _, _, surface = left_sides(form)
+    return [
+        ("core_K_per_s", coefficient(surface, NU[1])),
+        ("surface_K_per_s", coefficient(surface, NU[2])),
+        ("surface_K_per_s", coefficient(surface, NU_S_BOUND)),
+        ("coolant_K_per_s", coefficient(surface, NU[3])),
+        ("surface_rate_K_per_s2", coefficient(surface, NU_S_RATE)),
+    ]
 
 
 def numbers(cell, preset):
     """What each symbol of the model stands for."""
     limits, gains = preset.limits, preset.gains
+    # The first link has the larger root: it asks less of a state.
+    roots_per_s = sorted(-np.roots([1.0, gains.alpha4_per_s, gains.alpha3_per_s2]), reverse=True)
     return {
         RC: cell.core_resistance_K_per_W,
         CC: cell.core_heat_capacity_J_per_K,
@@ -107,6 +129,9 @@ def numbers(cell, preset):
         ALPHA[1]: gains.core_gain_per_s(cell),
         ALPHA[2]: gains.alpha3_per_s2,
         ALPHA[3]: gains.alpha4_per_s,
+        ROOTS[0]: roots_per_s[0],
+        ROOTS[1]: roots_per_s[1],
+        NU_S_BOUND: preset.uncertainty.surface_K_per_s,
         SOC_MAX: limits.max_soc,
         TC_MAX: limits.max_core_temperature_K,
         TS_MAX: limits.max_surface_temperature_K,
@@ -134,6 +159,10 @@ def random_cell(draw_from):
     return replace(cell, **changed, entropic_coefficient_V_per_K=float(entropy))
 
 
+def in_form(preset, form):
+    return replace(preset, gains=replace(preset.gains, surface_condition=form))
+
+
 def cells():
     """Both presets, and random cells with the first preset's limits and gains."""
     shipped = [load_preset(name) for name in one_cell_preset_names()]
@@ -152,26 +181,39 @@ def test_relative_degrees_are_one_one_and_two():
     assert along_model(along_model(barriers[2])).has(U)
 
 
-@pytest.mark.parametrize("name", list(derived()[0]))
-def test_constant_follows_from_the_model(name):
-    expression = derived()[0][name]
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", list(derived()))
+def test_constant_follows_from_the_model(name, form):
+    expression = derived(form)[name]
     for cell, preset in cells():
-        constants = barrier_constants(cell, preset)
+        constants = barrier_constants(cell, in_form(preset, form))
         assert getattr(constants, name) == pytest.approx(value(expression, cell, preset), rel=1e-10)
 
 
-def test_disturbance_margin_is_the_worst_case_of_every_disturbance():
+@pytest.mark.parametrize("form", FORMS)
+def test_disturbance_margin_is_the_worst_case_of_every_disturbance(form):
     for cell, preset in cells():
         worst = sum(
             abs(value(expression, cell, preset)) * getattr(preset.uncertainty, name)
-            for name, expression in derived()[1].items()
+            for name, expression in disturbed(form)
         )
-        assert barrier_constants(cell, preset).delta4_K_per_s2 == pytest.approx(worst, rel=1e-10)
+        delta4 = barrier_constants(cell, in_form(preset, form)).delta4_K_per_s2
+        assert delta4 == pytest.approx(worst, rel=1e-10)
+
+
+@pytest.mark.parametrize("name", one_cell_preset_names())
+def test_shipped_presets_assume_no_slope_of_the_surface_disturbance(name):
+    preset = load_preset(name)
+    wilder = replace(preset.uncertainty, surface_rate_K_per_s2=1e6)
+
+    assert barrier_constants(preset.cell, preset) == barrier_constants(
+        preset.cell, replace(preset, uncertainty=wilder)
+    )
 
 
 def test_estimation_error_enters_by_a1_minus_alpha2_and_a4_with_their_current_terms():
-    _, core, surface = left_sides()
-    constants = derived()[0]
+    _, core, surface = left_sides("paper")
+    constants = derived()
     for side, expected in (
         (core, constants["a1_per_s"] - ALPHA[1] + constants["a2_per_As"] * U),
         (surface, constants["a4_per_s2"] + constants["a8_per_As2"] * U),
@@ -195,7 +237,7 @@ def worst_sides(cell, preset, state, cooling_W, current_A, error_bound_K):
     error_K, *disturbances = np.array(amplitudes)[:, None] * corners
     soc, tc, ts, tinf = state
     true_state = (soc, tc + error_K, ts, tinf)
-    sides = _numeric_sides()(
+    sides = _numeric_sides(preset.gains.surface_condition)(
         *numbers(cell, preset).values(), *true_state, current_A, cooling_W, *disturbances
     )
     return [float(np.min(side)) for side in sides]
@@ -206,12 +248,13 @@ def worst_sides(cell, preset, state, cooling_W, current_A, error_bound_K):
     current_A=st.floats(-25.0, 0.0),
     error_bound_K=st.floats(0.0, 2.0),
     name=st.sampled_from(one_cell_preset_names()),
+    form=st.sampled_from(FORMS),
 )
 def test_left_hand_sides_are_the_worst_case_over_errors_and_disturbances(
-    seed, current_A, error_bound_K, name
+    seed, current_A, error_bound_K, name, form
 ):
     random = np.random.default_rng(seed)
-    preset = load_preset(name)
+    preset = in_form(load_preset(name), form)
     preset = replace(preset, uncertainty=replace(preset.uncertainty, soc_per_s=1e-5))
     cell = random_cell(random)
     state = CellState(random.uniform(0.0, 1.0), *random.uniform(280.0, 330.0, 3))
@@ -227,10 +270,10 @@ def test_left_hand_sides_are_the_worst_case_over_errors_and_disturbances(
 
 
 @cache
-def _numeric_sides():
+def _numeric_sides(form):
     cell, preset = load_preset("lin2014").cell, load_preset("lin2014")
     arguments = (*numbers(cell, preset), *STATES, U, QC, *NU, NU_S_RATE)
-    return sp.lambdify(arguments, left_sides())
+    return sp.lambdify(arguments, left_sides(form))
 
 
 @given(
@@ -280,7 +323,7 @@ PRINTED_CONSTANTS = {
 def test_a_constant_as_the_paper_prints_it_does_not_pass(slip, preset_name):
     name, confused = PRINTED_CONSTANTS[slip]
     preset = load_preset(preset_name)
-    printed = value(derived()[0][name].subs(confused), preset.cell, preset)
+    printed = value(derived()[name].subs(confused), preset.cell, preset)
     assert getattr(barrier_constants(preset.cell, preset), name) != pytest.approx(printed, rel=1e-3)
 
 

@@ -23,6 +23,7 @@ from bms.cell import CellState, Disturbance, integrate_step
 from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.presets import load_preset, one_cell_preset_names
+from bms.presets.paper_form import in_paper_form
 from bms.verification.conditions import decided_conditions, firmware_constants
 
 CELLS = 2
@@ -34,11 +35,15 @@ def derived() -> Derivation:
 
 
 def random_presets():
-    """The shipped presets and cells drawn around them, both signs of the entropic coefficient."""
+    """The shipped presets, also in the paper's form, and cells drawn around them.
+
+    Both signs of the entropic coefficient.
+    """
     random = np.random.default_rng(3)
     for name in one_cell_preset_names():
         preset = load_preset(name)
         yield preset
+        yield in_paper_form(preset)
         for _ in range(CELLS):
             factors = {
                 key: getattr(preset.cell, key) * float(np.exp(random.uniform(-1, 1)))
@@ -52,11 +57,38 @@ def random_presets():
             yield replace(preset, cell=replace(preset.cell, **factors))
 
 
+@cache
+def worst_case_surface():
+    """The surface condition whose chain has the largest disturbance in it, at the worst case.
+
+    Its first link is itself a barrier, and the theorem is asked about that one.
+    """
+    d, s = derived(), derived().symbols
+    first, second = sympy.symbols("first second", positive=True)
+    barrier = s.max_surface_temperature_K - s.surface_temperature_K
+    link = -d.model.drift[2] - s.surface_K_per_s + first * barrier
+    noise = d.model.disturbance
+    bounds = dict(zip(noise[1:], (s.core_K_per_s, s.surface_K_per_s, s.coolant_K_per_s)))
+    return first, second, derive_condition(d.model, link, [second]).worst_case(bounds)
+
+
+def condition_in_force(name: str, preset):
+    """A condition at the worst disturbance in the form of the preset, its states symbols."""
+    d = derived()
+    if (name, preset.gains.surface_condition) != ("surface", "worst-case"):
+        return d.worst_case(name).subs(d.values(preset, 0.0))
+    first, second, condition = worst_case_surface()
+    smaller_per_s, larger_per_s = check_gains(
+        [preset.gains.alpha3_per_s2, preset.gains.alpha4_per_s]
+    )
+    chain = {first: larger_per_s, second: smaller_per_s}
+    return condition.subs(d.values(preset, 0.0) | chain)
+
+
 def coefficients(name: str, preset) -> dict[str, float]:
     """Coefficients of a derived condition at true temperatures, as numbers."""
-    d = derived()
-    s = d.symbols
-    condition = sympy.expand(d.worst_case(name).subs(d.values(preset, 0.0)))
+    s = derived().symbols
+    condition = sympy.expand(condition_in_force(name, preset))
     states = {s.core_temperature_K: 0, s.surface_temperature_K: 0, s.coolant_temperature_K: 0}
     inputs = {s.current_A: 0, s.cooling_power_W: 0}
 

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from scipy.interpolate import RegularGridInterpolator
 
 from bms.cell import (
     CellParameters,
@@ -25,11 +26,12 @@ from bms.cell import (
 from bms.errors import InputError
 from bms.presets import load_preset, preset_names
 
-MEASURED_OCV = Path(__file__).parents[3] / "shared/data/a123_26650_ocv_25degC.csv"
+MEASURED = Path(__file__).parents[3] / "shared/data"
+MEASURED_OCV = MEASURED / "a123_26650_ocv_25degC.csv"
+SLOW_DISCHARGE = MEASURED / "samsung_30q_s001_c10.csv"
 STEP_S = 0.01
 CELL = load_preset("lin2014").cell
 
-presets = pytest.mark.parametrize("name", preset_names())
 cells_of_constants = pytest.mark.parametrize(
     "name", [n for n in preset_names() if load_preset(n).cell.resistance is None]
 )
@@ -149,7 +151,7 @@ def test_many_cells_at_once_give_what_each_gives_alone():
         assert [column[index] for column in together] == pytest.approx(list(alone), rel=1e-15)
 
 
-@presets
+@pytest.mark.parametrize("name", [n for n in preset_names() if n != "samsung_30q"])
 def test_ocv_table_follows_the_measurement(name):
     if not MEASURED_OCV.exists():
         pytest.skip(f"not run: {MEASURED_OCV} is absent")
@@ -157,6 +159,32 @@ def test_ocv_table_follows_the_measurement(name):
         rows = [(float(row["soc"]), float(row["ocv_V"])) for row in csv.DictReader(file)]
     soc, measured_V = np.array(rows).T
     assert np.max(np.abs(load_preset(name).cell.ocv(soc) - measured_V)) <= 2e-3
+
+
+def test_ocv_of_the_30q_is_a_slow_discharge_with_the_drop_over_its_resistances_added():
+    """C/10 to empty; after ten minutes the branches carry the whole current."""
+    if not SLOW_DISCHARGE.exists():
+        pytest.skip(f"not run: {SLOW_DISCHARGE} is absent")
+    cell = load_preset("samsung_30q").cell
+    assert cell.resistance is not None
+    table = np.genfromtxt(SLOW_DISCHARGE, delimiter=",", encoding="utf-8-sig")
+    time_s, discharge_A, voltage_V, surface_K = (
+        *(table[:, :3] * [1, -1, 1]).T,
+        table[:, 4] + 273.15,
+    )
+    charge_As = np.concatenate([[0.0], np.cumsum(np.diff(time_s) * discharge_A[1:])])
+    soc = (charge_As[-1] - charge_As) / cell.capacity_As
+    ohmic = RegularGridInterpolator(
+        (cell.resistance.temperature_K, cell.resistance.soc), np.array(cell.resistance.ohm)
+    )(np.stack([surface_K, np.minimum(soc, cell.resistance.soc[-1])], axis=1))
+    drop_V = discharge_A * (ohmic + sum(branch.resistance_ohm for branch in cell.branches))
+    loaded = (time_s > 600.0) & (discharge_A > 0.1)
+
+    apart_V = np.abs(cell.ocv(soc) - (voltage_V + drop_V))[loaded]
+
+    assert np.count_nonzero(loaded) > 1000 and np.min(soc[loaded]) < 1e-3
+    assert np.max(apart_V) <= 6e-3
+    assert np.sqrt(np.mean(apart_V**2)) <= 1.5e-3
 
 
 def test_ocv_is_linear_between_points_and_constant_outside():

@@ -13,6 +13,7 @@ from bms.cell import CellState, integrate_step
 from bms.errors import InputError
 from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset, preset_path
+from bms.presets.paper_form import in_paper_form
 from bms.studies.paper_fit import fit as fitting
 from bms.studies.paper_fit.closed_loop import (
     HORIZON_S,
@@ -25,6 +26,9 @@ from bms.studies.paper_fit.preset_text import with_values
 
 CALIBRATED = load_preset("paper_calibrated")
 ERROR_BOUND_K = load_shipped_model("paper_calibrated").error_bound_K
+
+
+PAPERS = in_paper_form(CALIBRATED)
 
 
 def start_of(preset):
@@ -138,8 +142,8 @@ def test_many_candidates_at_once_give_what_each_gives_alone():
 def test_a_charge_that_is_not_full_in_time_is_reported_as_later_than_the_horizon():
     hot = Start(0.0, CALIBRATED.limits.max_surface_temperature_K, 0.0)
     for charge in (
-        charge_with_robust_barriers(CALIBRATED.cell, CALIBRATED, hot, 0.5, 1.0),
-        charge_with_surface_barrier(CALIBRATED.cell, CALIBRATED, hot, 1.0),
+        charge_with_robust_barriers(CALIBRATED.cell, PAPERS, hot, 0.5, 1.0),
+        charge_with_surface_barrier(CALIBRATED.cell, PAPERS, hot, 1.0),
     ):
         assert charge.time_s > HORIZON_S
 

@@ -100,7 +100,7 @@ def test_all_complaints_come_at_once(tmp_path) -> None:
         ("core_heat_capacity_J_per_K", "core_heat_capacity"),
         ("max_core_temperature_K = 323.0", "max_core_temperature_K = 50.0"),
         ("reference_current_A = -23.0", "reference_current_A = 23.0"),
-        ("alpha4_per_s = 0.6", "alpha4_per_s = 0.1"),
+        ("alpha4_per_s = 0.192", "alpha4_per_s = 0.1"),
         ("max_voltage_V = 3.6", "max_voltage_V = 7.2"),
         ("surface_temperature_K = [283.0, 326.0]", "surface_temperature_K = [326.0, 283.0]"),
         ("cooling_power_W = [0.0, 3.0]", "cooling_power_W = [3.0, 3.0]"),

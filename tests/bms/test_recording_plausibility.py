@@ -212,13 +212,18 @@ def test_every_command_that_reads_recordings_refuses_them(bms, tmp_path, command
     assert [path.name for path in tmp_path.iterdir()] == ["run.csv"]
 
 
+WITHOUT_CORE = "column core_temperature_K"
+NO_CHARGE = "no recording charges the cell"
+"""Without a core `bms identify` makes a whole preset, and this one is of a discharge alone."""
+
+
 @needs_cases
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize(
     ("case", "told"),
     [
         ("30Q_4C_celsius.csv", "degrees Celsius"),
-        ("30Q_4C_nocore.csv", "column core_temperature_K"),
+        ("30Q_4C_nocore.csv", WITHOUT_CORE),
         ("30Q_4C_wrong_sign_core_is_surface.csv", "current_A: voltage_V moves with it"),
     ],
 )
@@ -232,7 +237,7 @@ def test_recordings_that_were_once_taken_are_refused(bms, tmp_path, command, cas
     code, out, err = bms(*(word.format(**places) for word in COMMANDS[command]))
 
     assert (code, out) == (2, "")
-    assert told in err
+    assert (NO_CHARGE if (command, told) == ("identify", WITHOUT_CORE) else told) in err
     assert len(err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
 

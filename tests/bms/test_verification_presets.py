@@ -15,6 +15,7 @@ from bms.cell import CellState, Disturbance, integrate_step, rates
 from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.presets import load_preset, one_cell_preset_names
+from bms.presets.paper_form import in_paper_form
 from bms.verification import SLIPS, verify
 from bms.verification.boxes import Boxes
 from bms.verification.conditions import chains, firmware_constants, required_conditions
@@ -27,6 +28,8 @@ from tests.bms.plausible_presets import model_for, other_cells, plausible_preset
 OTHERS = other_cells()
 FEW_SAMPLES, FEW_BOXES, FEW_OWN_BOXES = 20_000, 40_000, 2_000
 ERROR_BOUNDS_K = st.floats(0.05, 1.5)
+FORMS = {"its own": lambda preset: preset, "the paper's": in_paper_form}
+"""Gains and surface condition of a shipped preset."""
 
 
 def with_limits(preset, **limits):
@@ -67,14 +70,16 @@ def test_any_plausible_preset_is_certified_by_the_whole_command(preset, error_bo
         assert obstacle.reason and obstacle.state and obstacle.change
 
 
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("held", [(0.5, 1.0), (1.0, 2.0)])
-def test_a_hold_as_long_as_the_fast_mode_is_certified_by_histories_from_rest(held):
-    preset = with_timing(load_preset("paper_calibrated"), *held)
+def test_a_hold_as_long_as_the_fast_mode_is_certified_by_histories_from_rest(held, form):
+    preset = with_timing(FORMS[form](load_preset("paper_calibrated")), *held)
     cell = preset.cell
     into_surface_W_per_K = 1 / cell.core_resistance_K_per_W + 1 / cell.surface_resistance_K_per_W
     assert sum(held) > cell.surface_heat_capacity_J_per_K / into_surface_W_per_K
+    model = model_for(preset, shipped="paper_calibrated")
 
-    result = verify(preset, model_for(preset), samples=FEW_SAMPLES)
+    result = verify(preset, model, samples=FEW_SAMPLES)
 
     assert result.certified
     assert any(b.certificate.by_history for b in result.barriers)
@@ -108,13 +113,17 @@ def test_no_history_of_inputs_leaves_the_enclosed_rates_within_the_hold(name, he
         )
 
 
-def test_a_search_that_ends_too_early_says_how_many_boxes_to_give():
-    pair = load_pair("lin2014", None)
+@pytest.mark.parametrize(
+    ("form", "hardest"), [("its own", "surface, psi = B4' + 0.16 B4"), ("the paper's", "core")]
+)
+def test_a_search_that_ends_too_early_says_how_many_boxes_to_give(form, hardest):
+    preset, model = load_pair("lin2014", None)
+    pair = FORMS[form](preset), model
 
     result = verify(*pair, largest_boxes=500, samples=FEW_SAMPLES)
 
-    assert not result.certified and list(result.refusals) == ["core"]
-    refusal = result.refusals["core"]
+    assert not result.certified and list(result.refusals) == [hardest]
+    refusal = result.refusals[hardest]
     assert re.fullmatch(r"undecided after \d+ boxes", refusal.reason)
     assert set(refusal.state) == {
         "surface_K", "core_gap_K", "coolant_gap_K", "current_A", "cooling_W",
@@ -159,19 +168,24 @@ def test_completion_at_the_limit_of_charge_says_how_much_less_would_do():
     assert float(lower) > 0.99, "less than is needed"
 
 
-def test_a_start_too_near_the_temperature_limit_says_which_start_would_do():
-    preset = load_preset("lin2014")
-    preset = replace(preset, initial=replace(preset.initial, temperature_K=322.0))
+@pytest.mark.parametrize(("form", "start_K"), [("its own", 322.9), ("the paper's", 322.0)])
+def test_a_start_too_near_the_temperature_limit_says_which_start_would_do(form, start_K):
+    preset = FORMS[form](load_preset("lin2014"))
 
-    result = verify(preset, model_for(preset), samples=FEW_SAMPLES)
+    def from_start(temperature_K):
+        started = replace(preset, initial=replace(preset.initial, temperature_K=temperature_K))
+        return verify(started, model_for(started), samples=FEW_SAMPLES)
+
+    result = from_start(start_K)
 
     (obstacle,) = result.obstacles
     assert result.certified
     (lower,) = re.fullmatch(
         r"start at an initial\.temperature_K of (\S+) or less", obstacle.change
     ).groups()
-    mended = replace(preset, initial=replace(preset.initial, temperature_K=float(lower)))
-    assert verify(mended, model_for(mended), samples=FEW_SAMPLES).obstacles == ()
+    assert from_start(float(lower)).obstacles == ()
+    (still,) = from_start(float(lower) + 0.1).obstacles
+    assert still.change == obstacle.change, "colder than is needed"
 
 
 @pytest.mark.parametrize("limit", ["max_core_temperature_K", "max_surface_temperature_K"])

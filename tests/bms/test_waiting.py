@@ -158,7 +158,7 @@ def on_terminal(*arguments: str) -> tuple[str, str]:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (("sil", "--max-time-s", "5", "--json"), "kan-rcbf, state of charge"),
+        (("sil", "--max-time-s", "5", "--json"), "kan-rcbf-fastest, state of charge"),
         (("campaign", "--runs", "2", "--max-time-s", "5", "--json"), "of 2 runs"),
     ],
     ids=["sil", "campaign"],

@@ -13,6 +13,7 @@ from scipy.optimize import differential_evolution, least_squares
 from bms.arrays import Array
 from bms.cell import CellParameters
 from bms.presets import Preset
+from bms.presets.paper_form import in_paper_form
 from bms.presets.schema import Initial
 from bms.studies.paper_fit.closed_loop import (
     Charge,
@@ -86,7 +87,11 @@ def both_charges(
     error_bound_K: float | None,
     period_s: float,
 ) -> tuple[Charge, Charge]:
-    """Charges with KAN-rCBF and with S-CBF; without an error bound the expected one."""
+    """Charges with KAN-rCBF and with S-CBF by the paper's gains, whatever those of the preset.
+
+    Without an error bound the expected one.
+    """
+    preset = in_paper_form(preset)
     bound_K = expected_error_bound_K(cell) if error_bound_K is None else error_bound_K
     return (
         charge_with_robust_barriers(cell, preset, start, bound_K, period_s),
