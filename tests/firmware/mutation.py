@@ -33,7 +33,7 @@ class CompiledFirmware:
         return self.variant_of_changes(source, {old: new}, out)
 
     def variant_of_changes(self, source: str, changes: Mapping[str, str], out: Path) -> Path:
-        """Build folder `out` with each old text replaced by its new one in firmware_c/src/SOURCE."""
+        """Build folder `out` with each text replaced by its new one in firmware_c/src/SOURCE."""
         text = (ROOT / "firmware_c" / "src" / source).read_text(encoding="utf-8")
         for old, new in changes.items():
             assert old in text, "the mutant no longer applies; bring it up to date"
