@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,11 +30,17 @@ class CompiledFirmware:
 
     def variant(self, source: str, old: str, new: str, out: Path) -> Path:
         """Build folder `out` with `old` replaced by `new` in firmware_c/src/SOURCE."""
+        return self.variant_of_changes(source, {old: new}, out)
+
+    def variant_of_changes(self, source: str, changes: Mapping[str, str], out: Path) -> Path:
+        """Build folder `out` with each text replaced by its new one in firmware_c/src/SOURCE."""
         text = (ROOT / "firmware_c" / "src" / source).read_text(encoding="utf-8")
-        assert old in text, "the mutant no longer applies; bring it up to date"
+        for old, new in changes.items():
+            assert old in text, "the mutant no longer applies; bring it up to date"
+            text = text.replace(old, new)
         out.mkdir(parents=True)
         mutant = out / source
-        mutant.write_text(text.replace(old, new), encoding="utf-8")
+        mutant.write_text(text, encoding="utf-8")
         compiler = os.environ.get("CC", "gcc")
         includes = [f"-I{ROOT / folder}" for folder in FIRMWARE.folders]
         changed = mutant.with_suffix(".o")

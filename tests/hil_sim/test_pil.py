@@ -183,7 +183,7 @@ def test_a_line_without_losses_passes(settings, bms):
     with Line(Serial(settings).answer) as line:
         code, out, err = bms("sil", "--bus", line.bus, "--max-time-s", "0.5", "--json")
     assert code == 1
-    assert err.startswith("bms: kan-rcbf: time ended before the charge")
+    assert err.startswith("bms: kan-rcbf-fastest: time ended before the charge")
     assert json.loads(out)["violations"] == []
     assert json.loads(out)["line_losses"] == {"to_ecu": 0, "from_ecu": 0}
     assert json.loads(out)["model_hash"] == settings.model.hash[:8]
@@ -213,7 +213,7 @@ def test_a_baseline_runs_here_beside_the_ecu_at_the_other_end(settings, bms):
         arguments = ["--baseline", "cc-cv", "--max-time-s", "0.5", "--json"]
         code, out, err = bms("sil", "--bus", line.bus, *arguments)
     assert code == 1
-    assert err.startswith("bms: kan-rcbf: time ended before the charge")
+    assert err.startswith("bms: kan-rcbf-fastest: time ended before the charge")
     baseline = json.loads(out)["baseline"]
     assert baseline["bus"] == "virtual:bms"
     assert baseline["line_losses"] is None

@@ -11,6 +11,7 @@ import pytest
 
 from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.bus import buses
+from hil_sim.bus.catalog import Mode
 from hil_sim.logs.recorder import Recorder
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import Settings
@@ -34,7 +35,7 @@ bus=(--bus socketcan:vcan0)
 "${bms[@]}" plant "${bus[@]}" --answer-timeout-s 0.1 2> alone.err; echo $? > alone.status
 
 ( "${bms[@]}" ecu "${bus[@]}" --silence-s 2 > ecu.out; echo $? > ecu.status ) &
-"${bms[@]}" plant "${bus[@]}" --seed SEED --max-time-s MAX_TIME --out run --json > plant.json
+"${bms[@]}" plant "${bus[@]}" --seed SEED --max-time-s MAX_TIME MODE --out run --json > plant.json
 echo $? > plant.status
 wait
 
@@ -54,8 +55,10 @@ def run_in_guest(*command, folder):
     )  # fmt: skip
 
 
-# A whole charge takes minutes in the guest; derating has begun by the end of the shorter one.
+# A whole charge takes minutes in the guest. Of the shorter one the charger asks for a current of
+# its own, so that derating has begun by the end; a planned one derates after 400 s.
 WHOLE_S, SHORT_S = 3600.0, 200.0
+MODES = {WHOLE_S: None, SHORT_S: Mode.FIXED}
 
 
 @pytest.fixture(
@@ -68,7 +71,9 @@ def max_time_s(request):
 @pytest.fixture(scope="module")
 def guest(tmp_path_factory, max_time_s):
     folder = tmp_path_factory.mktemp("vcan")
+    mode = "" if MODES[max_time_s] is None else f"--mode {MODES[max_time_s].label}"
     script = SCRIPT.replace("SEED", str(SEED)).replace("MAX_TIME", str(max_time_s))
+    script = script.replace("MODE", mode)
     done = run_in_guest("bash", "-c", script, folder=folder)
     assert done.returncode == 0, done.stderr
     return folder
@@ -80,7 +85,7 @@ def status(path):
 
 def test_two_processes_give_the_frames_of_the_virtual_bus(guest, max_time_s, preset, tmp_path):
     with Recorder(tmp_path / "can.log") as recorder:
-        settings = Settings(preset, seed=SEED, max_time_s=max_time_s)
+        settings = Settings(preset, seed=SEED, max_time_s=max_time_s, mode=MODES[max_time_s])
         expected = run_both(settings, recorder).summary
     assert (guest / "run" / "can.log").read_bytes() == (tmp_path / "can.log").read_bytes()
     summary = json.loads((guest / "plant.json").read_text())
@@ -97,7 +102,9 @@ def test_both_processes_end_well_and_the_ecu_saw_every_frame(guest, max_time_s):
     steps = json.loads((guest / "plant.json").read_text())["steps"]
     assert status(guest / "plant.status") == (0 if max_time_s == WHOLE_S else 1)
     assert status(guest / "ecu.status") == 0
-    assert f"{5 * steps} frames received, {steps} steps" in (guest / "ecu.out").read_text()
+    # SYNC, four messages of every charge, and the mode where one is asked for.
+    frames = (5 if MODES[max_time_s] is None else 6) * steps
+    assert f"{frames} frames received, {steps} steps" in (guest / "ecu.out").read_text()
 
 
 def test_a_plant_without_an_ecu_says_how_to_start_one(guest):
