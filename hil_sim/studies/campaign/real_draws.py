@@ -141,7 +141,7 @@ class _Draws:
         excess_K = self.pick(0.0, min(plug_in.core_excess_K, limit_K - surface_K))
         is_hot = self._rng.uniform() < HOT_CORE_SHARE
         core_K = min(surface_K + excess_K, limit_K) if is_hot else surface_K
-        least_W = LEAST_COOLING * _disturbance_W(preset, cell)
+        least_W = LEAST_COOLING * disturbance_W(preset, cell)
         cooling_W = self.pick(least_W, box.cooling_power_W[1])
         return CellState(soc, core_K, surface_K, coolant_K), cooling_W
 
@@ -174,7 +174,7 @@ class _Draws:
         return Readings(*(self.pick(-bound, bound) for bound in bounds))
 
 
-def _disturbance_W(preset: Preset, cell: CellParameters) -> float:
+def disturbance_W(preset: Preset, cell: CellParameters) -> float:
     """Heat of the disturbance at its bounds in a cell without a current, in W."""
     bounds = preset.uncertainty
     return (

@@ -11,7 +11,7 @@ from hil_sim.bus.catalog import FirstFault
 from hil_sim.plant.sensors import Readings
 from hil_sim.studies.campaign.draws import Draw
 from hil_sim.studies.campaign.engine import CONTROLLERS, CampaignCharge
-from hil_sim.studies.campaign.real_draws import RealDraw
+from hil_sim.studies.campaign.real_draws import RealDraw, disturbance_W
 from hil_sim.studies.campaign.settings import CellFamily
 
 FIRMWARE = "kan-rcbf"
@@ -99,6 +99,8 @@ def row(preset: Preset, run: int, drawn: Draw, charges: dict[str, CampaignCharge
         and error.surface <= bounds.surface_K_per_s
         and error.coolant <= bounds.coolant_K_per_s
         and slope_K_per_s2 <= bounds.surface_rate_K_per_s2
+        # With less cooling the disturbance heats the cell without end, charged or not.
+        and drawn.cooling_power_W >= disturbance_W(preset, drawn.cell)
     )
     return {
         "run": run,
