@@ -49,7 +49,7 @@ def test_steps_of_a_ridden_limit_are_small_with_noise_on(
 ) -> None:
     loaded = load_preset(preset)
     initial = replace(loaded.initial, temperature_K=start_K, soc=soc)
-    # At the present growth of a charge's ramp a single step of it is 0.23 A.
+    # A step of the ramp at the start is 0.5 A with the presets' own growth.
     growth_A = {"current_growth_A": LARGEST_STEP_A}
     result = run_both(
         Settings(loaded, initial=initial, mode=mode, seed=seed, max_time_s=time_s),

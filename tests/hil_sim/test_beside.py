@@ -33,7 +33,9 @@ def main_job(tmp_path_factory):
     )
     (line,) = [line for line in rule.stdout.splitlines() if "bms sil" in line]
     done = bms(*shlex.split(line)[1:])
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 0
+    # On a busy machine it says how far it is.
+    assert all(re.fullmatch(r"bms: .*, \d+ s", line) for line in done.stderr.splitlines())
     return done.stdout, out
 
 
