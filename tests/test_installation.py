@@ -90,7 +90,10 @@ def source_archive(folder: Path) -> Path:
 def sources(source_archive: Path, folder: Path) -> Path:
     """The source distribution, unpacked."""
     with tarfile.open(source_archive) as archive:
-        archive.extractall(folder, filter="data")
+        if hasattr(tarfile, "data_filter"):
+            archive.extractall(folder, filter="data")
+        else:  # before Python 3.11.4
+            archive.extractall(folder)
     return folder / source_archive.name.removesuffix(".tar.gz")
 
 

@@ -63,7 +63,7 @@ MUTANTS = [
     Mutant("a surface colder than the heat allows is a fault", "bms_symptoms.c", "limits->surface_deficit_K),", "9999.0f),", FAULTS, "colder"),
     Mutant("the prediction warms with the current", "thermal.c", "constants->gain_K_per_W[0] * heat_W", "0.0f * heat_W", THERMAL, "undisturbed"),
     Mutant("the prediction's error is granted", "thermal.c", " - constants->error_bound_K", "", THERMAL, "within_the_modelled"),
-    Mutant("the heat stands in for a sensor that reads cold", "bms.c", "bms->surface_temperature_K = coldest_K;", "(void)0;", STATES, "stands_in"),
+    Mutant("the heat stands in for a sensor that reads cold", "bms.c", "bms->surface_temperature_K = least_K;", "(void)0;", STATES, "stands_in"),
     Mutant("a latched fault ends the charge", "bms.c", "bms->state = BMS_FAULT;\n    }\n    const", "bms->state = bms->state;\n    }\n    const", FAULTS, "stops_the_charge"),
     Mutant("a symptom stops at once", "bms.c", "!bms->monitor.stop &&", "", FAULTS, "stops_the_charge"),
     Mutant("silence is noticed", "e2e.c", "receiver->is_good = false;", "(void)0;", FAULTS, "lost"),

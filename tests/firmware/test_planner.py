@@ -190,7 +190,8 @@ def test_a_mode_that_goes_away_ends_the_plan() -> None:
     for _ in range(150):
         bench.period()
     assert bench.command_A == pytest.approx(-1.72, abs=0.1)
-    for _ in range(60):
+    # The rest until the message counts as gone, at 0.138 A a period.
+    for _ in range(90):
         bench.period(drop=("ChargeMode",))
     assert bench.command_A < -10.0
 

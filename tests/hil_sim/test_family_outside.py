@@ -15,7 +15,8 @@ VOLTAGE_IMPLAUSIBLE, CURRENT_DEVIATION = 12, 11
 @pytest.mark.parametrize(
     ("case", "end", "fault"),
     [
-        ("ohmic resistance x 3", STOP_FAULT, VOLTAGE_IMPLAUSIBLE),
+        ("ohmic resistance x 3", STOP_COMPLETE, None),
+        ("capacity x 0.5", STOP_FAULT, VOLTAGE_IMPLAUSIBLE),
         ("charger gives 30 % more", STOP_FAULT, CURRENT_DEVIATION),
         ("resistance core to surface x 1.5", STOP_COMPLETE, None),
     ],
