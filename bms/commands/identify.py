@@ -106,7 +106,7 @@ def identify(
         temperature_unit,
         charge_is_positive,
         sample_period_s,
-        geometry,
+        geometry or None,
         tuple(rated or ()),
         entropy,
         check,

@@ -76,34 +76,23 @@ ReportOption = Annotated[
 
 @dataclass(frozen=True)
 class SurfaceOptions:
-    """The options together."""
+    """The options together, each as it is when it is not given."""
 
-    columns: tuple[str, ...]
-    temperature_unit: str
-    charge_is_positive: bool
-    sample_period_s: float | None
-    geometry: str | None
-    rated: tuple[str, ...]
-    entropy: Path | None
-    check: Path | None
-    save_as: Path | None
-    report: Path | None
+    columns: tuple[str, ...] = ()
+    temperature_unit: str = "K"
+    charge_is_positive: bool = False
+    sample_period_s: float | None = None
+    geometry: str | None = None
+    rated: tuple[str, ...] = ()
+    entropy: Path | None = None
+    check: Path | None = None
+    save_as: Path | None = None
+    report: Path | None = None
 
     @property
     def is_given(self) -> bool:
         """Whether any of them asks for the way without a measured core."""
-        return bool(
-            self.columns
-            or self.rated
-            or self.geometry
-            or self.entropy
-            or self.check
-            or self.save_as
-            or self.report
-            or self.charge_is_positive
-            or self.sample_period_s
-            or self.temperature_unit != "K"
-        )
+        return self != SurfaceOptions()
 
     @property
     def form(self) -> CyclerFormat:

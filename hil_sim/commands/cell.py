@@ -78,12 +78,10 @@ def cell(
         temperature_unit,
         charge_is_positive,
         sample_period_s,
-        geometry,
+        geometry or None,
         tuple(rated or ()),
         entropy,
         check,
-        None,
-        None,
     )
     first = _first_step(data or [], chosen, preset)
     steps = (first, *steps_after_preset(Choices(seed, jobs)))

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any, TypeVar
 
-from bms.errors import BmsError
 from bms.studies.optimum.answer import stated_s
 from bms.studies.optimum.bound import lower_bound
 from hil_sim.run.workforce import Workforce
@@ -52,7 +50,7 @@ def on_workforce(
 ) -> list[R]:
     """Results in the order of the pieces; `told` hears of each that is done.
 
-    Raises what the work does, and BmsError when a process dies.
+    Raises what the work does; who made the workforce tells of a process that dies.
     """
     futures = {force.executor.submit(work, piece): number for number, piece in enumerate(pieces)}
     results: dict[int, R] = {}
@@ -60,8 +58,6 @@ def on_workforce(
         for future in as_completed(futures):
             results[futures[future]] = future.result()
             told()
-    except BrokenProcessPool:
-        raise BmsError("a process of this command was ended by the system; lower --jobs") from None
     finally:
         for future in futures:
             future.cancel()

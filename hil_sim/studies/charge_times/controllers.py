@@ -21,6 +21,7 @@ from hil_sim.run.result import STOP_COMPLETE, RunResult
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import ControllerKind, Settings
 from hil_sim.studies.campaign.engine import CampaignCharge
+from hil_sim.studies.campaign.rows import FIRMWARE
 from hil_sim.studies.charge_times.native import charge_in_c
 from hil_sim.studies.charge_times.predictive import PredictiveController
 
@@ -155,7 +156,7 @@ def _planned(name: str, preset: Preset, longest_s: float) -> Played:
 
 
 def _fixed(name: str, preset: Preset, longest_s: float) -> Played:
-    charge = charge_in_c(preset, "kan-rcbf", longest_s, mode=Mode.FIXED)
+    charge = charge_in_c(preset, FIRMWARE, longest_s, mode=Mode.FIXED)
     return _played_in_c(name, preset, charge)
 
 

@@ -27,9 +27,10 @@ from hil_sim.studies.campaign.engine import CampaignCharge, Scenario
 from hil_sim.studies.campaign.noise import streams
 from hil_sim.studies.campaign.real_draws import RealDraw, draw_real
 from hil_sim.studies.campaign.real_summary import OVERFILLED_SOC
+from hil_sim.studies.campaign.rows import FIRMWARE
 from hil_sim.studies.campaign.settings import MAX_TIME_S, CampaignSettings, CellFamily
 from hil_sim.studies.campaign.worker import play
-from hil_sim.studies.charge_times.prediction import FIRMWARE, Listener
+from hil_sim.studies.charge_times.prediction import Listener
 
 PRESET = "a123_26650_10C"
 SAMPLES = 60

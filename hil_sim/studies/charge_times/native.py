@@ -9,14 +9,17 @@ from collections.abc import Callable
 
 import numpy as np
 
+from bms.cell import CellState
 from bms.model.model_file import load_shipped_model
 from bms.presets import Preset
 from hil_sim.bus.catalog import Mode
+from hil_sim.plant.sensors import Readings
 from hil_sim.plant.true_cell import nominal_cell
 from hil_sim.studies.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
 from hil_sim.studies.campaign.settings import CampaignSettings
 
 BLOCK_PERIODS = 1000
+UNDISTURBED = np.zeros(len(CellState._fields))
 SEED = 0
 """That of `bms sil`, whose sensor noise it is."""
 
@@ -47,12 +50,27 @@ def charge_in_c(
     if strongest_A is not None:
         scenario.fields.reference_current_A = -strongest_A
     rng = np.random.default_rng(np.random.SeedSequence(SEED).spawn(3)[1])
-    charge = CampaignCharge(scenario, controller, nominal_cell(preset), np.zeros(4))
-    knots = np.zeros((block_periods * SUB_STEPS, 4))
-    while not charge.is_over:
-        charge.advance(rng.standard_normal((block_periods, 5)), knots)
-        told(charge)
+    charge = CampaignCharge(scenario, controller, nominal_cell(preset), UNDISTURBED)
+    play_undisturbed(charge, rng, block_periods=block_periods, told=told)
     return charge
+
+
+def play_undisturbed(
+    charge: CampaignCharge,
+    rng: np.random.Generator,
+    *,
+    noise: float = 1.0,
+    block_periods: int = BLOCK_PERIODS,
+    told: Callable[[CampaignCharge], None] = lambda charge: None,
+) -> None:
+    """A charge without a disturbance to its end; `noise` scales that of the sensors.
+
+    `told` sees the charge after each block.
+    """
+    knots = np.zeros((block_periods * SUB_STEPS, UNDISTURBED.size))
+    while not charge.is_over:
+        charge.advance(noise * rng.standard_normal((block_periods, len(Readings._fields))), knots)
+        told(charge)
 
 
 def _plain(mode: Mode | None) -> Mode | None:

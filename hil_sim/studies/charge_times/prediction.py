@@ -11,6 +11,7 @@ from bms.studies.optimum.bound import lower_bound
 from hil_sim.bus.catalog import Mode
 from hil_sim.run.result import STOP_COMPLETE
 from hil_sim.studies.campaign.engine import CampaignCharge
+from hil_sim.studies.campaign.rows import FIRMWARE
 from hil_sim.studies.charge_times.controllers import LONGEST_SHARE
 from hil_sim.studies.charge_times.native import charge_in_c
 from hil_sim.studies.charge_times.starts import Start
@@ -25,8 +26,6 @@ ASKED_OVER_OPTIMUM = (1.06, 1.2, 1.5, 2.0)
 """Times that are asked for, over physics' bound."""
 KEPT_ERROR = 0.01
 """Of a time that was asked for."""
-
-FIRMWARE = "kan-rcbf"
 
 
 class Listener:
@@ -48,23 +47,25 @@ class Listener:
     def worst_share(self, full_after_s: float) -> float | None:
         """The same over the time of the whole charge."""
         errors = _errors_s(self._told, full_after_s)
-        return max(errors) / full_after_s if errors else None
+        return max(error for error, _ in errors) / full_after_s if errors else None
 
 
 def worst_error(told: Sequence[tuple[float, float]], full_after_s: float) -> float | None:
     """Largest error of predictions (time, time to full, both in s) over what was truly left."""
-    left_s = [full_after_s - time_s for time_s, _ in told if FROM_S <= time_s < full_after_s]
-    errors = [error / left for error, left in zip(_errors_s(told, full_after_s), left_s)]
-    return max(errors) if errors else None
+    errors = _errors_s(told, full_after_s)
+    return max(error / left for error, left in errors) if errors else None
 
 
-def _errors_s(told: Sequence[tuple[float, float]], full_after_s: float) -> list[float]:
-    """Beyond the signal's step, of what was told from FROM_S on."""
-    return [
-        max(abs(predicted_s - (full_after_s - time_s)) - STEP_S, 0.0)
+def _errors_s(
+    told: Sequence[tuple[float, float]], full_after_s: float
+) -> list[tuple[float, float]]:
+    """Errors beyond the signal's step, each with what was left, of what was told from FROM_S on."""
+    foretold = (
+        (predicted_s, full_after_s - time_s)
         for time_s, predicted_s in told
         if FROM_S <= time_s < full_after_s
-    ]
+    )
+    return [(max(abs(predicted - left) - STEP_S, 0.0), left) for predicted, left in foretold]
 
 
 @dataclass(frozen=True)

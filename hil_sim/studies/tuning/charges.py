@@ -8,22 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bms.arrays import Array
 from bms.calibration import NO_CHANGES
-from bms.cell import CellState
 from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.presets.schema import Initial
 from hil_sim.plant.true_cell import nominal_cell
-from hil_sim.studies.campaign.engine import SUB_STEPS, CampaignCharge, Scenario
+from hil_sim.run.result import STOP_COMPLETE
+from hil_sim.studies.campaign.engine import CampaignCharge, Scenario
+from hil_sim.studies.campaign.rows import FIRMWARE
 from hil_sim.studies.campaign.settings import CampaignSettings
+from hil_sim.studies.charge_times.native import UNDISTURBED, play_undisturbed
 
 SOCS = (0.01, 0.5)
 COOLING_SHARES = (0.5, 1.0)
 """Of the preset's cooling power."""
 LONGEST_S = 10_800.0
 _INSIDE_BOX_K, _BELOW_LIMIT_K = 2.0, 10.0
-_BLOCK_PERIODS = 1000
 
 
 @dataclass(frozen=True)
@@ -74,14 +74,11 @@ def outcomes(
 
 def _outcome(scenario: Scenario, start: Initial, seed: int, noise: float) -> Outcome:
     preset = scenario.preset
-    charge = CampaignCharge(scenario, "kan-rcbf", nominal_cell(preset, start), np.zeros(4))
-    random = np.random.Generator(np.random.Philox(seed))
-    knots: Array = np.zeros((_BLOCK_PERIODS * SUB_STEPS, len(CellState._fields)))
-    while not charge.is_over:
-        charge.advance(noise * random.standard_normal((_BLOCK_PERIODS, 5)), knots)
+    charge = CampaignCharge(scenario, FIRMWARE, nominal_cell(preset, start), UNDISTURBED)
+    play_undisturbed(charge, np.random.Generator(np.random.Philox(seed)), noise=noise)
     peaks, limits = charge.fields.peaks.cell, preset.limits
     return Outcome(
-        float(charge.fields.time_s) if charge.outcome == "complete" else math.inf,
+        float(charge.fields.time_s) if charge.outcome == STOP_COMPLETE else math.inf,
         (
             limits.max_core_temperature_K - float(peaks.core_temperature_K),
             limits.max_surface_temperature_K - float(peaks.surface_temperature_K),
