@@ -59,14 +59,14 @@ typedef struct {
 typedef struct {
     bool is_searching;
     uint8_t tried;
-    uint8_t trying; /* which of the two inner candidates */
+    uint8_t trying; /* which of the candidates */
     float age_s;    /* since the search began */
     planner_start_t start;
     planner_goal_t goal;
     /* Golden section between low and high. */
     float low_A;
     float high_A;
-    planner_candidate_t inner[2];
+    planner_candidate_t inner[3]; /* the last is the plan in force */
     planner_candidate_t best;
     /* The prediction under way. */
     float temperature_K[PLANNER_MASSES];

@@ -6,18 +6,24 @@
 #include "numeric.h"
 
 #define SEARCH_EVERY_S 10.0f
-/* Predictions of a search; golden section leaves 0.618 of the interval with each. */
+/* Predictions of a search beside that of the plan in force; golden section leaves 0.618 of the
+ * interval with each. */
 #define CANDIDATES 14u
 #define GOLDEN 0.618034f
 /* The interval, in shares of the strongest current: a little beyond it, so that it is tried too. */
 #define LEAST_SHARE 0.02f
 #define MOST_SHARE 1.1f
+/* Once there is a plan the search is for a better one up to this many times as strong or weak. */
+#define NEAR 2.0f
 /* A prediction that takes longer is given up. */
 #define LONGEST_S 36000.0f
 /* More than any strength: what is in time is better than all that is late. */
 #define IN_TIME (-1e4f)
 
 enum { CORE, SURFACE, COOLANT, HEAT, COOLING };
+
+/* Behind the two inner candidates of the search. */
+#define IN_FORCE 2u
 
 bool planner_constants_are_valid(const planner_constants_t *constants)
 {
@@ -100,8 +106,11 @@ static float family_limit_A(const planner_t *planner, const rcbf_constants_t *k,
 static float next_strength_A(const planner_t *planner, const planner_constants_t *constants,
                              const rcbf_constants_t *cell, const family_constants_t *family)
 {
+    /* In the middle of the step, if it goes on as before. */
+    const float middle_soc =
+        planner->soc + 0.5f * constants->step_s * planner->strength_A / cell->capacity_As;
     const float room_V = cell->max_voltage_V - cell->voltage_margin_V -
-                         rcbf_open_circuit_voltage_V(cell, planner->soc);
+                         rcbf_open_circuit_voltage_V(cell, middle_soc);
     const float voltage_A = room_V / planner->start.resistance_ohm;
     const float limit_A = (family->is_stated != 0u) ? family_limit_A(planner, cell, family)
                                                     : cell_limit_A(planner, cell, constants->step_s);
@@ -130,12 +139,8 @@ static void advance(planner_t *planner, const planner_constants_t *constants, fl
     planner->elapsed_s += constants->step_s;
 }
 
-/* The other two thirds of the interval lie beside each inner candidate. */
-static void begin_prediction(planner_t *planner, uint8_t which)
+static void begin_prediction(planner_t *planner, uint8_t which, float strength_A)
 {
-    const float part_A = GOLDEN * (planner->high_A - planner->low_A);
-    const float strength_A =
-        (which == 0u) ? (planner->high_A - part_A) : (planner->low_A + part_A);
     for (uint32_t i = 0u; i < PLANNER_MASSES; i++) {
         planner->temperature_K[i] = planner->start.temperature_K[i];
     }
@@ -144,6 +149,14 @@ static void begin_prediction(planner_t *planner, uint8_t which)
     planner->elapsed_s = 0.0f;
     planner->trying = which;
     planner->inner[which].strength_A = numeric_smaller(strength_A, planner->goal.strongest_A);
+}
+
+/* The other two thirds of the interval lie beside each inner candidate. */
+static void begin_inner(planner_t *planner, uint8_t which)
+{
+    const float part_A = GOLDEN * (planner->high_A - planner->low_A);
+    begin_prediction(planner, which,
+                     (which == 0u) ? (planner->high_A - part_A) : (planner->low_A + part_A));
 }
 
 /* A sum is finite only where all parts are. */
@@ -166,9 +179,18 @@ void planner_begin(planner_t *planner)
     planner->age_s = 0.0f;
     planner->tried = 0u;
     planner->best.cost = FLT_MAX;
-    planner->low_A = LEAST_SHARE * planner->goal.strongest_A;
-    planner->high_A = MOST_SHARE * planner->goal.strongest_A;
-    begin_prediction(planner, 0u);
+    const float planned_A = planner->planned_A;
+    const float strongest_A = planner->goal.strongest_A;
+    planner->low_A = LEAST_SHARE * strongest_A;
+    planner->high_A = MOST_SHARE * strongest_A;
+    if (planned_A > planner->low_A) {
+        /* The time has more than one least: what is in force stays until something beats it. */
+        planner->low_A = numeric_larger(planner->low_A, planned_A / NEAR);
+        planner->high_A = numeric_smaller(planner->high_A, planned_A * NEAR);
+        begin_prediction(planner, IN_FORCE, planned_A);
+    } else {
+        begin_inner(planner, 0u);
+    }
 }
 
 static void end_prediction(planner_t *planner, float time_s)
@@ -186,10 +208,14 @@ static void end_prediction(planner_t *planner, float time_s)
         /* Heat of the first seconds is missed to the end: the best so far is better than none. */
         planner->planned_A = planner->best.strength_A;
     }
+    if (planner->trying == IN_FORCE) {
+        begin_inner(planner, 0u);
+        return;
+    }
     planner->tried++;
     /* Of two that are worth the same the stronger one is taken: the limits are the filter's. */
     if (planner->tried == 1u) {
-        begin_prediction(planner, 1u);
+        begin_inner(planner, 1u);
     } else if (planner->tried >= CANDIDATES) {
         /* The best one is the plan until the next search has ended. */
         planner->is_searching = false;
@@ -198,11 +224,11 @@ static void end_prediction(planner_t *planner, float time_s)
     } else if (inner[0].cost < inner[1].cost) {
         planner->high_A = inner[1].strength_A;
         inner[1] = inner[0];
-        begin_prediction(planner, 0u);
+        begin_inner(planner, 0u);
     } else {
         planner->low_A = inner[0].strength_A;
         inner[0] = inner[1];
-        begin_prediction(planner, 1u);
+        begin_inner(planner, 1u);
     }
 }
 
