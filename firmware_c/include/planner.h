@@ -38,9 +38,12 @@ typedef struct {
 typedef struct {
     float temperature_K[PLANNER_MASSES];
     float soc;
+    float soc_per_As;
     float strength_A; /* half a step ago, as far as growth is concerned */
     float cooling_power_W;
-    float resistance_ohm; /* that heats, and that takes voltage */
+    float resistance_ohm; /* that heats */
+    float total_ohm;      /* that takes voltage */
+    float family_resistance_ohm; /* greatest of the family at this temperature; else not used */
     float entropic_V;     /* reversible heat for each ampere */
 } planner_start_t;
 
@@ -72,6 +75,7 @@ typedef struct {
     float temperature_K[PLANNER_MASSES];
     float soc;
     float strength_A;
+    float resistance_ohm;
     float elapsed_s;
     /* What is in force; NaN without a plan. */
     float planned_A;

@@ -1,6 +1,7 @@
 #include "bms_plan.h"
 
 #include "bms_symptoms.h"
+#include "family_tables.h"
 #include "numeric.h"
 
 /* As soon as possible. */
@@ -26,34 +27,56 @@ static float time_left_s(const bms_t *bms)
     return (asked_mode(bms) == MODE_BY_TIME) ? bms->measurement.time_to_full_s : NO_TIME_LEFT_S;
 }
 
+/* Of the cell at hand are known its hottest core and its greatest heat, which its limits go by, and
+ * between which bounds its charge and resistance are. */
+static void describe_family(const bms_t *bms, planner_start_t *start)
+{
+    const rcbf_constants_t *cell = &bms->calibration->rcbf;
+    const family_constants_t *known = &bms->calibration->family;
+    const family_t *family = &bms->family;
+    const float voltage_V = bms->measurement.voltage_V;
+    const float most_A = family->strength_A + known->current_error_A;
+    const float greatest_ohm = family->resistance_ohm + known->polarisation_ohm;
+    start->temperature_K[0] = -family->core_room_K;
+    start->entropic_V = family->entropic_V;
+    start->family_resistance_ohm = family->resistance_ohm;
+    /* Without current the heat says nothing of the resistance. */
+    start->resistance_ohm = numeric_smaller(
+        (family->heat_W / most_A - family->entropic_V) / most_A, greatest_ohm);
+    if (asked_mode(bms) == MODE_BY_TIME) {
+        /* In time is what even the least full of the largest cells is. */
+        start->soc = family->soc_low.soc;
+        return;
+    }
+    start->soc = numeric_clamp(
+        0.5f * (family->soc_low.soc + family->soc_high.soc),
+        family_soc_at(cell, voltage_V - greatest_ohm * most_A),
+        family_soc_at(cell, voltage_V - known->least_resistance_ohm * most_A));
+    start->soc_per_As =
+        0.5f * (known->least_soc_per_A + known->greatest_soc_per_A) / known->period_s;
+    start->total_ohm = numeric_clamp(
+        (voltage_V - rcbf_open_circuit_voltage_V(cell, start->soc)) / most_A,
+        known->least_resistance_ohm, greatest_ohm);
+}
+
 static void describe(const bms_t *bms, planner_start_t *start, planner_goal_t *goal)
 {
     const codec_measurement_t *m = &bms->measurement;
     const bms_calibration_t *calibration = bms->calibration;
-    const family_t *family = &bms->family;
     const float core_K = bms->estimate.core_temperature_K;
     const float limit_K = calibration->rcbf.max_core_temperature_K.high_K;
     start->temperature_K[0] = core_K - limit_K;
     start->temperature_K[1] = bms->surface_temperature_K - limit_K;
     start->temperature_K[2] = m->coolant_temperature_K - limit_K;
     start->soc = bms->soc.soc;
+    start->soc_per_As = 1.0f / calibration->rcbf.capacity_As;
     start->strength_A = -bms->command_A - 0.5f * calibration->planner.growth_A;
     start->cooling_power_W = m->cooling_power_W;
     start->resistance_ohm = calibration->thermal.ohmic_resistance_ohm;
+    start->total_ohm = start->resistance_ohm;
     start->entropic_V = calibration->thermal.entropic_coefficient_V_per_K * core_K;
     if (has_family(bms)) {
-        /* Of the cell at hand no more is known than the hottest core, the greatest heat and the
-         * least charge, which is what the end of a charge goes by. Without current the heat says
-         * nothing of the resistance. */
-        const float most_A = family->strength_A + calibration->family.current_error_A;
-        const float greatest_ohm = family->resistance_ohm + calibration->family.polarisation_ohm;
-        start->soc = family->soc_low.soc;
-        start->temperature_K[0] = -family->core_room_K;
-        start->entropic_V = family->entropic_V;
-        start->resistance_ohm = (family->heat_W / most_A - family->entropic_V) / most_A;
-        if (start->resistance_ohm > greatest_ohm) {
-            start->resistance_ohm = greatest_ohm;
-        }
+        describe_family(bms, start);
     }
     goal->strongest_A = -m->reference_current_A;
     if (goal->strongest_A > -calibration->reference_current_A) {

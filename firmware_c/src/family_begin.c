@@ -3,18 +3,6 @@
 #include "family_tables.h"
 #include "numeric.h"
 
-/* Greatest or least state of charge whose open-circuit voltage may be this one. */
-static float soc_at(const rcbf_constants_t *cell, float voltage_V)
-{
-    const uint32_t last = cell->ocv_points - 1u;
-    const float clamped = numeric_clamp(voltage_V, cell->ocv_V[0], cell->ocv_V[last]);
-    const uint32_t segment = numeric_segment(cell->ocv_V, cell->ocv_points, clamped);
-    const float *at_V = &cell->ocv_V[segment];
-    const float *at = &cell->ocv_soc[segment];
-    const float share = (clamped - at_V[0]) / (at_V[1] - at_V[0]);
-    return at[0] + share * (at[1] - at[0]);
-}
-
 bool family_is_at_rest(const family_constants_t *constants, const family_reading_t *reading)
 {
     return numeric_abs(reading->current_A) <= 2.0f * constants->current_error_A;
@@ -35,8 +23,8 @@ void family_begin(family_t *family, const family_constants_t *constants,
                               constants->rest_polarisation_V +
                               3.0f * constants->current_error_A * constants->resistance_ohm[0];
         const float seen_low =
-            soc_at(cell, reading->voltage_V - error_V - family->polarisation_V);
-        const float seen_high = soc_at(cell, reading->voltage_V + error_V);
+            family_soc_at(cell, reading->voltage_V - error_V - family->polarisation_V);
+        const float seen_high = family_soc_at(cell, reading->voltage_V + error_V);
         low = numeric_larger(told_low, seen_low);
         high = numeric_smaller(told_high, seen_high);
         if (low > high) {

@@ -25,6 +25,17 @@ uint32_t family_soc_cell(float soc)
                                    (float)(FAMILY_SOC_CELLS - 1));
 }
 
+float family_soc_at(const rcbf_constants_t *cell, float voltage_V)
+{
+    const uint32_t last = cell->ocv_points - 1u;
+    const float clamped = numeric_clamp(voltage_V, cell->ocv_V[0], cell->ocv_V[last]);
+    const uint32_t segment = numeric_segment(cell->ocv_V, cell->ocv_points, clamped);
+    const float *at_V = &cell->ocv_V[segment];
+    const float *at = &cell->ocv_soc[segment];
+    const float share = (clamped - at_V[0]) / (at_V[1] - at_V[0]);
+    return at[0] + share * (at[1] - at[0]);
+}
+
 float family_greatest(const float *cells, uint32_t first, uint32_t end)
 {
     const float *last = &cells[end - 1u];

@@ -10,6 +10,9 @@ float family_resistance_ohm(const family_constants_t *constants, float temperatu
 /* Cell of the grid that a state of charge is in. */
 uint32_t family_soc_cell(float soc);
 
+/* State of charge whose open-circuit voltage is this one, or the table's end that is nearest. */
+float family_soc_at(const rcbf_constants_t *cell, float voltage_V);
+
 /* Greatest value of any cell of the grid from the first to the one before the end. */
 float family_greatest(const float *cells, uint32_t first, uint32_t end);
 

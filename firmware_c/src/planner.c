@@ -95,23 +95,35 @@ static float family_limit_A(const planner_t *planner, const rcbf_constants_t *k,
                             family->gain_W_per_K * (above_K[CORE] + family->inner_K) -
                             family->disturbance_W - family->hold_W;
     const float core_A = curved_A(outflow_W, planner->start.entropic_V + family->disturbance_W_per_A,
-                                planner->start.resistance_ohm + family->disturbance_W_per_A2);
+                                planner->resistance_ohm + family->disturbance_W_per_A2);
     return numeric_smaller(core_A,
                   family_mapped_A(&family->map,
                                   k->max_core_temperature_K.high_K + above_K[SURFACE],
                                   planner->soc));
 }
 
+/* What is left of a family's resistance: a cell that has warmed up resists less. */
+static float left_of_resistance(const planner_t *planner, const rcbf_constants_t *cell,
+                                const family_constants_t *family)
+{
+    const float surface_K = cell->max_core_temperature_K.high_K + planner->temperature_K[SURFACE];
+    return (family->is_stated != 0u) ? (family_resistance_ohm(family, surface_K) /
+                                        planner->start.family_resistance_ohm)
+                                     : 1.0f;
+}
+
 /* What flows in the mean of the next step of a prediction. */
-static float next_strength_A(const planner_t *planner, const planner_constants_t *constants,
+static float next_strength_A(planner_t *planner, const planner_constants_t *constants,
                              const rcbf_constants_t *cell, const family_constants_t *family)
 {
+    const float left = left_of_resistance(planner, cell, family);
+    planner->resistance_ohm = left * planner->start.resistance_ohm;
     /* In the middle of the step, if it goes on as before. */
     const float middle_soc =
-        planner->soc + 0.5f * constants->step_s * planner->strength_A / cell->capacity_As;
+        planner->soc + 0.5f * constants->step_s * planner->strength_A * planner->start.soc_per_As;
     const float room_V = cell->max_voltage_V - cell->voltage_margin_V -
                          rcbf_open_circuit_voltage_V(cell, middle_soc);
-    const float voltage_A = room_V / planner->start.resistance_ohm;
+    const float voltage_A = room_V / (left * planner->start.total_ohm);
     const float limit_A = (family->is_stated != 0u) ? family_limit_A(planner, cell, family)
                                                     : cell_limit_A(planner, cell, constants->step_s);
     const float allowed_A =
@@ -122,7 +134,7 @@ static float next_strength_A(const planner_t *planner, const planner_constants_t
 static void advance(planner_t *planner, const planner_constants_t *constants, float strength_A)
 {
     const planner_start_t *start = &planner->start;
-    const float heat_W = strength_A * (start->resistance_ohm * strength_A + start->entropic_V);
+    const float heat_W = strength_A * (planner->resistance_ohm * strength_A + start->entropic_V);
     const float *row = constants->response;
     float next_K[PLANNER_MASSES];
     for (uint32_t i = 0u; i < PLANNER_MASSES; i++) {
@@ -164,8 +176,9 @@ static bool is_known(const planner_start_t *start, const planner_goal_t *goal)
 {
     return numeric_is_finite(start->temperature_K[CORE] + start->temperature_K[SURFACE] +
                              start->temperature_K[COOLANT] + start->soc + start->strength_A +
-                             start->cooling_power_W + start->resistance_ohm + start->entropic_V +
-                             goal->strongest_A + goal->time_left_s) &&
+                             start->cooling_power_W + start->resistance_ohm + start->total_ohm +
+                             start->entropic_V + start->soc_per_As + goal->strongest_A +
+                             goal->time_left_s) &&
            (start->resistance_ohm > 0.0f) && (goal->strongest_A > 0.0f);
 }
 
@@ -247,7 +260,7 @@ void planner_step(planner_t *planner, const planner_constants_t *constants,
     planner->time_to_full_s -= constants->period_s;
     for (uint32_t i = 0u; planner->is_searching && (i < PLANNER_STEPS); i++) {
         const float strength_A = next_strength_A(planner, constants, cell, family);
-        const float charged = strength_A * constants->step_s / cell->capacity_As;
+        const float charged = strength_A * constants->step_s * planner->start.soc_per_As;
         const float missing = constants->completion_soc - planner->soc;
         if (!is_hopeful(planner)) {
             end_prediction(planner, FLT_MAX);

@@ -23,8 +23,10 @@ from bms.commands.options import (
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
 from bms.waiting import waiting
+from hil_sim.bus.catalog import Mode
 from hil_sim.commands import options
 from hil_sim.commands.campaign_output import print_classes, print_family
+from hil_sim.commands.charge_mode import ChargeMode
 from hil_sim.run.workforce import Workforce, dask_workforce, local_workforce
 from hil_sim.studies.campaign.histogram import save_histograms
 from hil_sim.studies.campaign.nominal import NominalPart
@@ -54,6 +56,14 @@ def campaign(
         typer.Option(
             "--nominal-part",
             help="Let the firmware take this part of a real family for nominal: what it is for.",
+        ),
+    ] = None,
+    mode: Annotated[
+        ChargeMode | None,
+        typer.Option(
+            "--mode",
+            help="What the charger asks KAN-rCBF for beside the reference current: to follow it "
+            "(fixed), or the fastest charge. Default: nothing, which is the fastest.",
         ),
     ] = None,
     max_time_s: Annotated[
@@ -94,6 +104,7 @@ def campaign(
         max_time_s=MAX_TIME_S[family] if max_time_s is None else max_time_s,
         family=family,
         nominal_part=nominal_part,
+        mode=None if mode is None else Mode[mode.name],
     )
     is_real = family is CellFamily.REAL
     workforce = local_workforce(jobs) if scheduler is None else dask_workforce(scheduler)

@@ -47,17 +47,33 @@ def test_no_constant_reference_is_much_faster_than_the_planned_charge() -> None:
     assert time_s(charge(PAPER, 303.0, Mode.FASTEST)) < 1.005 * min(others)
 
 
-@pytest.mark.parametrize(("preset", "start_K"), [(PAPER, None), (PAPER, 303.0), (LIN, 313.0)])
+WEAKLY_COOLED_BOUND_S = 1724.2
+"""Of `bms optimum --preset paper_calibrated --start 313 --soc 0.01 --cooling 0.1152`."""
+
+
+def test_a_plan_stays_in_force_until_a_better_one_is_found() -> None:
+    """Hot and hardly cooled, the time has two least values over the strength."""
+    settings = starting_at(PAPER, 313.0)
+    cooling_W = 0.5 * settings.preset.initial.cooling_power_W
+    initial = replace(settings.initial, soc=0.01, cooling_power_W=cooling_W)
+    result = run_both(replace(settings, initial=initial, mode=Mode.FASTEST))
+    assert WEAKLY_COOLED_BOUND_S < time_s(result) < 1.025 * WEAKLY_COOLED_BOUND_S
+
+
+@pytest.mark.parametrize(
+    ("preset", "start_K"), [(PAPER, None), (PAPER, 303.0), (LIN, None), (LIN, 313.0)]
+)
 def test_the_predicted_time_to_full_comes_true(preset: str, start_K: float | None) -> None:
     result = charge(preset, start_K, Mode.FASTEST)
     end_s, series = time_s(result), result.series
     told = [
         (time, predicted)
         for time, predicted in zip(series.time_s, series.predicted_time_to_full_s)
-        if predicted is not None and 120.0 < time < end_s - 30.0
+        if predicted is not None and 60.0 < time < end_s
     ]
     assert len(told) > 100
-    assert all(abs(left - (end_s - time)) < 0.05 * (end_s - time) + 0.5 for time, left in told)
+    # Of what is left, and the signal's step.
+    assert all(abs(left - (end_s - time)) < 0.05 * (end_s - time) + 1.0 for time, left in told)
 
 
 # The least is 1.06 times the bound; where ramp and margins alone take more, a little above that.
@@ -136,7 +152,9 @@ START: dict[str, Any] = {
     "soc": 0.1,
     "strength_A": 0.0,
     "cooling_power_W": 0.2,
+    "soc_per_As": 1.0 / 8280.0,
     "resistance_ohm": 0.0125,
+    "total_ohm": 0.0125,
     "entropic_V": 0.1,
 }
 GOAL = {"strongest_A": 23.0, "time_left_s": -1.0}
@@ -165,14 +183,14 @@ def test_a_period_takes_no_more_steps_than_it_may_and_a_search_ends() -> None:
     planner = begun(START, GOAL)
     most_s, periods = lib.PLANNER_STEPS * 5.0, 0
     while planner.is_searching:
-        tried, elapsed_s = planner.tried, planner.elapsed_s
+        tried, trying, elapsed_s = planner.tried, planner.trying, planner.elapsed_s
         lib.planner_step(
             planner, ffi.addressof(calibration, "planner"),
             ffi.addressof(calibration, "rcbf"), ffi.addressof(calibration, "family"),
         )  # fmt: skip
         periods += 1
         assert planner.tried - tried <= 2
-        if planner.tried == tried:
+        if (planner.tried, planner.trying) == (tried, trying):
             assert planner.elapsed_s - elapsed_s == most_s
     assert (planner.tried, periods < 250) == (14, True)
     assert 1.0 < planner.planned_A < 23.0

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from bms.cell import CellFactors, scaled
 from bms.presets import load_preset
 from hil_sim.bus.catalog import Mode
 from hil_sim.plant.true_cell import nominal_cell
@@ -49,6 +50,22 @@ def test_a_family_is_full_in_time_though_its_count_ends_early(told: float, suppl
 def test_the_fastest_charge_of_a_family_is_no_slower_than_the_fixed_one() -> None:
     fixed_s = time_s(charge(Mode.FIXED, None, *WRONGLY_PLUGGED_IN))
     assert time_s(charge(Mode.FASTEST, None, *WRONGLY_PLUGGED_IN)) <= fixed_s + 1.0
+
+
+@pytest.mark.parametrize("resistance", [1.0, 1.6])
+def test_the_predicted_time_of_a_family_comes_true(resistance: float) -> None:
+    """Within a fifth of the charge, for a cell of middle capacity."""
+    cell = nominal_cell(PRESET, HALF_FULL)
+    cell = replace(cell, cell=scaled(cell.cell, CellFactors(resistance=resistance, capacity=0.9)))
+    result = run_both(Settings(PRESET, initial=HALF_FULL, true_cell=cell, max_time_s=3000.0))
+    end_s, series = time_s(result), result.series
+    told = [
+        abs(predicted - (end_s - time))
+        for time, predicted in zip(series.time_s, series.predicted_time_to_full_s)
+        if predicted is not None and time > 60.0
+    ]
+    assert len(told) > 100
+    assert max(told) < 0.2 * end_s
 
 
 class Pausing(StepwiseEcu):

@@ -17,6 +17,7 @@ from bms.errors import InputError
 from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset
 from bms.presets.schema import Initial
+from hil_sim.bus.catalog import Mode
 from hil_sim.commands import campaign as command
 from hil_sim.plant.true_cell import nominal_cell
 from hil_sim.run.workforce import (
@@ -32,6 +33,7 @@ from hil_sim.studies.campaign.settings import CHUNK_RUNS, CampaignSettings
 from hil_sim.studies.campaign.store import CampaignFolder
 from hil_sim.studies.campaign.summary import column, firmware_is_safe, summarise
 from hil_sim.studies.campaign.worker import run_chunk
+from tests.hil_sim.command_line import bms
 
 PRESET = "paper_calibrated"
 ALONE = Workforce(InlineExecutor(), 1)
@@ -129,6 +131,20 @@ def test_an_interrupt_from_the_keyboard_keeps_whole_pieces(tmp_path):
     first = int(pieces[0].stem)
     assert pieces[0].read_text() == run_chunk(settings, range(first, first + CHUNK_RUNS))
     assert all(piece.read_text().count("\n") == CHUNK_RUNS for piece in pieces)
+
+
+def test_a_mode_is_asked_for_by_name_and_a_time_cannot_be(tmp_path):
+    times_s = {}
+    for mode in ("fixed", "fastest"):
+        bms("campaign", "--runs", 1, "--mode", mode, "--out", tmp_path / mode)
+        (row,) = CampaignFolder(
+            tmp_path / mode, settings_of(1, mode=Mode[mode.upper()]), True
+        ).rows()
+        times_s[mode] = float(row["kan_rcbf_charge_time_s"])
+    assert times_s["fastest"] < times_s["fixed"]
+    refused = bms("campaign", "--mode", "by-time", "--out", tmp_path / "none")
+    assert (refused.returncode, "choose fastest or fixed" in refused.stderr) == (2, True)
+    assert not (tmp_path / "none").exists()
 
 
 def test_only_the_same_campaign_is_resumed(tmp_path):
