@@ -37,6 +37,8 @@ static void describe_family(const bms_t *bms, planner_start_t *start)
     const float voltage_V = bms->measurement.voltage_V;
     const float most_A = family->strength_A + known->current_error_A;
     const float greatest_ohm = family->resistance_ohm + known->polarisation_ohm;
+    const float error_V =
+        known->voltage_error_V + known->ocv_error_V + known->rest_polarisation_V;
     start->temperature_K[0] = -family->core_room_K;
     start->entropic_V = family->entropic_V;
     start->family_resistance_ohm = family->resistance_ohm;
@@ -50,8 +52,8 @@ static void describe_family(const bms_t *bms, planner_start_t *start)
     }
     start->soc = numeric_clamp(
         0.5f * (family->soc_low.soc + family->soc_high.soc),
-        family_soc_at(cell, voltage_V - greatest_ohm * most_A),
-        family_soc_at(cell, voltage_V - known->least_resistance_ohm * most_A));
+        family_soc_at(cell, voltage_V - error_V - greatest_ohm * most_A),
+        family_soc_at(cell, voltage_V + error_V - known->least_resistance_ohm * most_A));
     start->soc_per_As =
         0.5f * (known->least_soc_per_A + known->greatest_soc_per_A) / known->period_s;
     start->total_ohm = numeric_clamp(

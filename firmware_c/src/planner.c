@@ -265,7 +265,9 @@ void planner_step(planner_t *planner, const planner_constants_t *constants,
         if (!is_hopeful(planner)) {
             end_prediction(planner, FLT_MAX);
         } else if (charged >= missing) {
-            end_prediction(planner, planner->elapsed_s + constants->step_s * (missing / charged));
+            /* A family may have to prove what its count says already. */
+            end_prediction(planner, planner->elapsed_s +
+                                        constants->step_s * numeric_larger(missing / charged, 0.0f));
         } else {
             planner->soc += charged;
             advance(planner, constants, strength_A);
