@@ -205,15 +205,22 @@ def asked_table(content: Mapping[str, Any]) -> TextTable:
 FAMILY_HEADINGS = ("of the cells of a family", "median", "worst")
 
 
+FAMILY_RATIOS = (
+    ("full", "by physics alone", "full_after_s_over_optimum_time_s"),
+    ("full", "with ramp and map", "full_after_s_over_bound_s"),
+    ("said to be full", "by physics alone", "charge_time_s_over_optimum_time_s"),
+    ("said to be full", "with ramp and map", "charge_time_s_over_bound_s"),
+)
+
+
 def family_rows(content: Mapping[str, Any]) -> list[list[str]]:
     """Rows below FAMILY_HEADINGS."""
-    truly, said = (
-        content[f"{time}_over_optimum_time_s"] for time in ("full_after_s", "charge_time_s")
-    )
     errors = [row["worst_error"] for row in content["charges"] if row["worst_error"] is not None]
     return [
-        ["truly full, over physics' bound of the cell", *map(ratio_text, truly.values())],
-        ["said to be full, over the same", *map(ratio_text, said.values())],
+        *(
+            [f"{when}, over the cell's bound {of}", *map(ratio_text, content[key].values())]
+            for when, of, key in FAMILY_RATIOS
+        ),
         [
             "worst error of what is left, over the time of the charge",
             *(f"{100.0 * error:.0f} %" for error in (median(errors), max(errors))),
