@@ -21,7 +21,7 @@ from hil_sim.replay.builds import compare_builds, logs_in
 from hil_sim.replay.comparison import compare
 from hil_sim.replay.engine import replay as replay_recording
 from hil_sim.replay.engine import write_replayed
-from hil_sim.replay.identity import choose_pair, identity_to_ignore
+from hil_sim.replay.identity import choose_pair, foreign_content_of, identity_to_ignore
 from hil_sim.replay.outcome import outcome
 from hil_sim.replay.recording import load_recording
 from hil_sim.replay.signals import Signals
@@ -112,6 +112,7 @@ def _replay(
         preset=ecu.preset.name,
         model_hash=ecu.model.hash[:8],
         is_identity_compared=not ignored,
+        foreign_content=foreign_content_of(recording, ecu.preset, ecu.model),
     )
     if as_json:
         print(json.dumps(report.to_json(), indent=2))

@@ -71,6 +71,9 @@ def identity(snapshot: Snapshot, in_force: PresetInForce) -> Text:
                 f"{name} ({known.preset_hash})"
             )
         )
+    for wrong in (snapshot.foreign_content, snapshot.restarts):
+        if wrong is not None:
+            lines.append(Text(wrong, _WRONG))
     if in_force.remark:
         lines.append(Text(in_force.remark, "yellow"))
     return Text("\n", no_wrap=True, overflow="ellipsis").join(lines)
