@@ -66,7 +66,10 @@ def check_application(image: bytes, target: str, origin: str) -> None:
     header = Header.parse(image[application.address :])
     floor = MEMORY_MAP.floor
     _require(floor_status(_part(image, floor), header.pack()), origin, "application", _NEWER)
-    gap = image[floor.address + FLOOR_LENGTH : floor.end] + image[application.address + header.length : application.end]
+    gap = (
+        image[floor.address + FLOOR_LENGTH : floor.end]
+        + image[application.address + header.length : application.end]
+    )
     if gap.strip(bytes([ERASED])):
         raise InputError(f"{origin}: bytes between the parts are not erased; {remedy}")
 

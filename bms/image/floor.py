@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from bms.image.memory_map import ERASED, MEMORY_MAP
+from bms.image.memory_map import MEMORY_MAP
 
 _RECORD = struct.Struct("<II")
 FLOOR_LENGTH = _RECORD.size
@@ -30,7 +30,6 @@ def floor_of(flash: bytes) -> int:
 
 def with_floor(image: bytes, version: int) -> bytes:
     """The image for a board that takes this version and newer ones."""
-    floor = MEMORY_MAP.floor
+    start = MEMORY_MAP.floor.address
     record = _RECORD.pack(version, version ^ _ERASED_WORD)
-    sector = record.ljust(floor.length, bytes([ERASED]))
-    return image[: floor.address] + sector + image[floor.end :]
+    return image[:start] + record + image[start + FLOOR_LENGTH :]

@@ -1,23 +1,17 @@
 #include "restart.h"
 
-#define MAGIC 0x54525352u
+#define CHECK_START 0x54525352u /* so that cleared memory is no record */
 #define MOST_COUNTED 254u
 
-/* What is noted may change at any time and stays outside of it. */
 static uint32_t check_of(const restart_record_t *record)
 {
-    return ~(record->magic + 3u * record->cause + 257u * record->count);
-}
-
-static bool is_known(const restart_record_t *record)
-{
-    return (record->magic == MAGIC) && (record->check == check_of(record));
+    return ~(CHECK_START + 3u * record->cause + 257u * record->count);
 }
 
 void restart_begin(restart_record_t *record)
 {
-    if (!is_known(record)) {
-        *record = (restart_record_t){ .magic = MAGIC, .cause = RESTART_POWER_ON };
+    if (record->check != check_of(record)) {
+        *record = (restart_record_t){ .cause = RESTART_POWER_ON };
     } else {
         const uint32_t noted = (record->noted == RESTART_FAULT || record->noted == RESTART_WATCHDOG)
                                    ? record->noted

@@ -29,11 +29,10 @@ typedef enum {
 } restart_cause_t;
 
 typedef struct {
-    uint32_t magic;
     uint32_t noted; /* restart_cause_t of the next start */
     uint32_t cause; /* of this start */
     uint32_t count; /* starts with this cause in a row, this one included; 0 after power came */
-    uint32_t check; /* over the others: what power left behind is no record */
+    uint32_t check; /* over cause and count: what power left behind is no record */
 } restart_record_t;
 
 /* To be called once at each start: finds the cause in the record, and counts. */

@@ -31,7 +31,7 @@ _RECEIVER_STYLES = {ReportedState.VALID.label: "green", ReportedState.INVALID.la
 _NOT_LIMITING = (ActiveConstraint.NONE.label, ActiveConstraint.INVALID.label, wording.NOT_AVAILABLE)
 _WRONG = "bold red"
 # What an undisturbed charge does without takes no room until it comes.
-_SELDOM = (*get_args(OptionalName), Message.PLAN, Message.BOOT_REFUSAL)
+_SELDOM = (*get_args(OptionalName), Message.PLAN, Message.START, Message.BOOT_REFUSAL)
 
 
 def header(snapshot: Snapshot, bus: str) -> Table:

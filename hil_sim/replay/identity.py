@@ -50,7 +50,10 @@ def foreign_content_of(recording: Recording, preset: Preset, model: KanModel) ->
     if not _is_of(_first_identity(recording), preset, model):
         return None
     frames = (frame for answer in recording.answers for frame in answer)
-    content, expected = first_content(frames, recording.database), calibration_content(preset, model)
+    content, expected = (
+        first_content(frames, recording.database),
+        calibration_content(preset, model),
+    )
     return None if content in (None, expected) else content_text(int(content), expected)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bms.errors import BusError, ModelMismatchError
-from bms.image import content_text
+from bms.image import content_text, foreign_content
 from bms.presets import Preset
 from hil_sim.bus.catalog import CommandState, FirstFault, Mode
 from hil_sim.bus.identity import Identity
@@ -54,7 +54,8 @@ class Charge:
     model_hash: str | None = None
     """The model that the ECU has to have; None for any."""
     content: int | None = None
-    """The content that its calibration has to have, as the ECU counts it; None for any."""
+    """The content that its calibration has to have, as the ECU counts it; None for that of the
+    shipped model and preset which the ECU names, and any where these do not ship."""
     plug_in_soc: float | None = None
     """State of charge that the charger tells the ECU; None for the true one."""
     progress: Progress = lambda soc: None
@@ -168,11 +169,8 @@ class Charge:
                 self.identity = identity
             self._heard_identity = identity
         content = answer.value("CalibrationContent")
-        if content is not None and self.content is not None:
-            if int(content) != self.content:
-                raise ModelMismatchError(
-                    f"the ECU does not start a charge: {content_text(int(content), self.content)}"
-                )
+        if content is not None:
+            self._check_content(int(content))
             self._is_content_known = True
 
     def _check(self, identity: Identity) -> None:
@@ -193,6 +191,17 @@ class Charge:
                 "that model: 'bms export --preset PRESET --model MODEL --out out/export' and "
                 "'bms flash --calibration out/export/calibration.bin'"
             )
+
+    def _check_content(self, content: int) -> None:
+        """Model and preset by hash are what the calibration was made from, not what it is."""
+        wrong: str | None = None
+        if self.content is not None and content != self.content:
+            wrong = content_text(content, self.content)
+        elif self.content is None and self.identity is not None:
+            known = self.identity
+            wrong = foreign_content(known.model_hash, known.preset_hash, content)
+        if wrong is not None:
+            raise ModelMismatchError(f"the ECU gets no charge: {wrong}")
 
     def _stop_reason(self, answer: Answer) -> str | None:
         if self._edge is None:

@@ -20,6 +20,7 @@ from bms.image import (
     with_calibration,
     with_floor,
 )
+
 _LINKED_FILES = {b"\x7fELF": "an ELF file", b":": "an Intel HEX file"}
 
 
@@ -73,22 +74,27 @@ class Flash:
     def _with_own_floor(self, image: bytes, allow_older: bool) -> bytes:
         """The image with the oldest version that the board takes from now on.
 
-        A board whose record is damaged takes none without being asked to.
+        A board whose record is damaged takes none without being asked to; an image with a damaged
+        one is left as it is, and so refused.
         """
         start = MEMORY_MAP.application.address
         if len(image) < MEMORY_MAP.application.end:
             return image  # is refused for its length
         version = Header.parse(image[start:]).firmware_version
-        if allow_older or not self.path.exists():
+        if allow_older:
             return with_floor(image, version)
         try:
-            floor = floor_of(self._content())
+            given = floor_of(image)
+        except ValueError:
+            return image
+        try:
+            present = floor_of(self._content()) if self.path.exists() else 0
         except ValueError as error:
             raise InputError(
                 f"{self.path}: the oldest firmware that the board takes is not known ({error}); "
                 "take this one all the same by --allow-older"
             ) from None
-        return with_floor(image, max(version, floor))
+        return with_floor(image, max(version, given, present))
 
     def _content(self) -> bytes:
         if not self.path.exists():
