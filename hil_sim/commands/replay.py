@@ -19,9 +19,10 @@ from hil_sim.commands.replay_output import ReplayReport, builds_json, print_buil
 from hil_sim.logs import Selection, usable_format
 from hil_sim.replay.builds import compare_builds, logs_in
 from hil_sim.replay.comparison import compare
+from hil_sim.replay.content import foreign_content_of
 from hil_sim.replay.engine import replay as replay_recording
 from hil_sim.replay.engine import write_replayed
-from hil_sim.replay.identity import choose_pair, foreign_content_of, identity_to_ignore
+from hil_sim.replay.identity import choose_pair, identity_to_ignore
 from hil_sim.replay.outcome import outcome
 from hil_sim.replay.recording import load_recording
 from hil_sim.replay.signals import Signals

@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from bms.errors import InputError
-from bms.image import calibration_content, content_text
 from bms.model.model_file import KanModel, load_model, shipped_model_path, shipped_models
 from bms.presets import Preset, load_preset, preset_names
 from hil_sim.bus.catalog import Message
 from hil_sim.bus.identity import Identity
 from hil_sim.replay.recording import Recording
-from hil_sim.replay.versions import first_content, first_identity
+from hil_sim.replay.versions import first_identity
 
 
 def choose_pair(
@@ -36,28 +35,14 @@ def identity_to_ignore(recording: Recording, preset: Preset, model: KanModel) ->
 
     Then it differs by intent, and only what follows from that is of interest.
     """
-    recorded = _first_identity(recording)
-    if _is_of(recorded, preset, model):
+    if is_of_pair(recording, preset, model):
         return ()
     return tuple(recording.database[name].frame_id for name in (Message.IDENTITY, Message.START))
 
 
-def foreign_content_of(recording: Recording, preset: Preset, model: KanModel) -> str | None:
-    """What is wrong with the calibration of a recorded ECU that names this preset and model.
-
-    None where its content is theirs, or where it does not tell.
-    """
-    if not _is_of(_first_identity(recording), preset, model):
-        return None
-    frames = (frame for answer in recording.answers for frame in answer)
-    content, expected = (
-        first_content(frames, recording.database),
-        calibration_content(preset, model),
-    )
-    return None if content in (None, expected) else content_text(int(content), expected)
-
-
-def _is_of(recorded: Identity | None, preset: Preset, model: KanModel) -> bool:
+def is_of_pair(recording: Recording, preset: Preset, model: KanModel) -> bool:
+    """Whether the recorded ECU said that it has this preset and model."""
+    recorded = _first_identity(recording)
     return (
         recorded is not None
         and model.hash.startswith(recorded.model_hash)

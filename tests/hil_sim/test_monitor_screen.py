@@ -102,7 +102,7 @@ def test_the_four_faults_of_a_plant_that_is_gone_are_all_on_the_screen(database,
 def test_what_came_and_comes_no_more_is_stale(size):
     text = text_of(snapshot_of(FOLDER / "hot_derating.log.gz", 25.0, age_s=200.0), *size)
     assert re.search(r" Derated +stale +socketcan:vcan0 +silent for 3 min", text)
-    assert text.count("stale") == 1 + 5 + 3 + 13 + (size[1] > 24) + 4 + 3
+    assert text.count("stale") == 1 + 5 + 3 + 13 + 2 * (size[1] > 24) + 4 + 3
     assert "━" not in text
 
 
