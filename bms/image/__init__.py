@@ -11,11 +11,12 @@ from bms.image.parts import (
     calibration_part,
     with_calibration,
 )
-from bms.image.shipped import content_text, foreign_content
+from bms.image.shipped import UNKNOWN_CONTENT, content_text, foreign_content
 
 __all__ = [
     "MEMORY_MAP",
     "TARGETS",
+    "UNKNOWN_CONTENT",
     "Header",
     "calibration_content",
     "calibration_of",

@@ -15,6 +15,10 @@ _REMEDY = (
 )
 
 
+UNKNOWN_CONTENT = 0xFFFF_FFFF
+"""CalibrationContent of an ECU that does not know its own."""
+
+
 @lru_cache
 def shipped_content(model_hash: str, preset_hash: str) -> int | None:
     """CalibrationContent of the shipped pair that these first digits name; None without one."""
@@ -33,8 +37,11 @@ def shipped_content(model_hash: str, preset_hash: str) -> int | None:
 def foreign_content(model_hash: str, preset_hash: str, content: int) -> str | None:
     """What is wrong with the content of a calibration that names a model and a preset by hash.
 
-    None where it is theirs, and where they do not ship, so that nobody here knows it.
+    None where it is theirs, where they do not ship, so that nobody here knows it, and where the
+    ECU does not know it.
     """
+    if content == UNKNOWN_CONTENT:
+        return None
     expected = shipped_content(model_hash, preset_hash)
     return None if expected in (None, content) else content_text(content, expected)
 

@@ -1,7 +1,7 @@
 #include "restart.h"
 
 #define CHECK_START 0x54525352u /* so that cleared memory is no record */
-#define MOST_COUNTED 254u
+#define MOST_COUNTED 253u
 
 static uint32_t check_of(const restart_record_t *record)
 {

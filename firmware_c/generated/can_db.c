@@ -1829,14 +1829,12 @@ bool can_db_start_reset_cause_is_in_phys_range(double value)
 
 bool can_db_start_reset_count_is_in_range(uint8_t value)
 {
-    (void)value;
-
-    return (true);
+    return (value <= 253u);
 }
 
 bool can_db_start_reset_count_is_in_phys_range(double value)
 {
-    return ((value >= 0.0) && (value <= 255.0));
+    return ((value >= 0.0) && (value <= 253.0));
 }
 
 bool can_db_start_calibration_content_is_in_range(uint32_t value)

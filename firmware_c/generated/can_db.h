@@ -1020,16 +1020,16 @@ struct can_db_start_t {
     uint8_t reset_cause;
 
     /**
-     * Starts with this cause in a row, 0 after power came; 254 means 254 or more.
+     * Starts with this cause in a row, 0 after power came; 253 means 253 or more.
      *
-     * Range: 0..255 (0..255 -)
+     * Range: 0..253 (0..253 -)
      * Scale: 1
      * Offset: 0
      */
     uint8_t reset_count;
 
     /**
-     * First bits of the SHA-256 of the calibration's bytes as they stand in flash. Who edits it changes this, but not the hashes of Identity. It authenticates nothing.
+     * First bits of the SHA-256 of the calibration's bytes as they stand in flash. Who edits it changes this, but not the hashes of Identity. It authenticates nothing. All ones: the ECU does not know it.
      *
      * Range: 0..4294967295 (0..4294967295 -)
      * Scale: 1

@@ -95,7 +95,7 @@ class Snapshot:
     def restarts(self) -> str | None:
         """Why and how often in a row the ECU has started; None for a start with the power."""
         cause, count = self.readings["ResetCause"].value, self.readings["ResetCount"].value
-        if cause in (None, ResetCause.POWER_ON) or count is None:
+        if cause in (None, ResetCause.POWER_ON, ResetCause.NOT_AVAILABLE) or count is None:
             return None
         return f"the ECU has restarted, {count:g} in a row: {self.name('ResetCause')}"
 

@@ -5,7 +5,7 @@ Apart from `identity`, since it needs the firmware, which a build must not find 
 
 from __future__ import annotations
 
-from bms.image import calibration_content, content_text
+from bms.image import UNKNOWN_CONTENT, calibration_content, content_text
 from bms.model.model_file import KanModel
 from bms.presets import Preset
 from hil_sim.replay.identity import is_of_pair
@@ -23,4 +23,6 @@ def foreign_content_of(recording: Recording, preset: Preset, model: KanModel) ->
     frames = (frame for answer in recording.answers for frame in answer)
     content = first_content(frames, recording.database)
     expected = calibration_content(preset, model)
-    return None if content is None or content == expected else content_text(content, expected)
+    if content in (None, UNKNOWN_CONTENT, expected):
+        return None
+    return content_text(content, expected)

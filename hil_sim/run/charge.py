@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bms.errors import BusError, ModelMismatchError
-from bms.image import content_text, foreign_content
+from bms.image import UNKNOWN_CONTENT, content_text, foreign_content
 from bms.presets import Preset
 from hil_sim.bus.catalog import CommandState, FirstFault, Mode
 from hil_sim.bus.identity import Identity
@@ -169,7 +169,7 @@ class Charge:
                 self.identity = identity
             self._heard_identity = identity
         content = answer.value("CalibrationContent")
-        if content is not None:
+        if content is not None and content != UNKNOWN_CONTENT:
             self._check_content(int(content))
             self._is_content_known = True
 
