@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import time
 from pathlib import Path
 from typing import Any
 
@@ -140,3 +141,17 @@ def test_a_board_that_was_reset_says_so_on_the_bus(tmp_path: Path) -> None:
     values = CODECS["Start"].decode(frame.data)
     assert values is not None
     assert (values["ResetCause"], values["ResetCount"]) == (OTHER, 1)
+
+
+@needs_emulator
+def test_a_board_that_turns_is_left_alone_by_its_watchdog(tmp_path: Path) -> None:
+    """A restart would close the channel, so that the second SYNC had no answer."""
+    sync = Frame(CODECS["SYNC"].frame_id, b"")
+    with Emulation(put(image(), tmp_path), BOARD) as board, open_bus(board.bus) as bus:
+        for wait_s in (0.0, 3.0):
+            time.sleep(wait_s)
+            bus.send(sync)
+            frame = bus.receive(ANSWER_TIMEOUT_S)
+            while frame is not None and frame.frame_id != CODECS["ChargeCommand"].frame_id:
+                frame = bus.receive(ANSWER_TIMEOUT_S)
+            assert frame is not None, f"silent after {wait_s} s"
