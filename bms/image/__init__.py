@@ -11,7 +11,7 @@ from bms.image.parts import (
     calibration_part,
     with_calibration,
 )
-from bms.image.shipped import UNKNOWN_CONTENT, content_text, foreign_content
+from bms.image.shipped import UNKNOWN_CONTENT, content_text, foreign_content, shipped_contents
 
 __all__ = [
     "MEMORY_MAP",
@@ -29,6 +29,7 @@ __all__ = [
     "foreign_content",
     "make_command",
     "port_name",
+    "shipped_contents",
     "with_calibration",
     "with_floor",
 ]

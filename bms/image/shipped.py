@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Mapping
+from functools import cache
+from types import MappingProxyType
 
-from bms.errors import ModelMismatchError
 from bms.image.parts import calibration_content
 from bms.model.model_file import load_model, shipped_models
 from bms.presets import load_preset, preset_names
@@ -19,19 +20,27 @@ UNKNOWN_CONTENT = 0xFFFF_FFFF
 """CalibrationContent of an ECU that does not know its own."""
 
 
-@lru_cache
-def shipped_content(model_hash: str, preset_hash: str) -> int | None:
-    """CalibrationContent of the shipped pair that these first digits name; None without one."""
-    presets = (load_preset(name) for name in preset_names())
-    models = (load_model(path) for path in shipped_models())
-    preset = next((p for p in presets if p.hash.startswith(preset_hash)), None)
-    model = next((m for m in models if m.hash.startswith(model_hash)), None)
-    if preset is None or model is None:
-        return None
-    try:
-        return calibration_content(preset, model)
-    except ModelMismatchError:
-        return None
+@cache
+def shipped_contents() -> Mapping[tuple[str, str], int]:
+    """Hashes of each shipped model and its preset -> CalibrationContent of the two.
+
+    Takes most of a second the first time: call it before anything that must not wait.
+    """
+    presets = {name: load_preset(name) for name in preset_names()}
+    contents = {}
+    for path in shipped_models():
+        model = load_model(path)
+        preset = presets.get(model.preset or "")
+        if preset is not None:
+            contents[model.hash, preset.hash] = calibration_content(preset, model)
+    return MappingProxyType(contents)
+
+
+def _shipped_content(model_digits: str, preset_digits: str) -> int | None:
+    for (model_hash, preset_hash), content in shipped_contents().items():
+        if model_hash.startswith(model_digits) and preset_hash.startswith(preset_digits):
+            return content
+    return None
 
 
 def foreign_content(model_hash: str, preset_hash: str, content: int) -> str | None:
@@ -42,7 +51,7 @@ def foreign_content(model_hash: str, preset_hash: str, content: int) -> str | No
     """
     if content == UNKNOWN_CONTENT:
         return None
-    expected = shipped_content(model_hash, preset_hash)
+    expected = _shipped_content(model_hash, preset_hash)
     return None if expected in (None, content) else content_text(content, expected)
 
 

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.live import Live
 
 from bms.commands.options import preset_option
+from bms.image import shipped_contents
 from hil_sim.bus.buses import require_shared
 from hil_sim.bus.database import load_codecs
 from hil_sim.commands import options
@@ -50,6 +51,7 @@ def monitor(
     require_shared(bus)
     finder = preset_finder(preset)
     model = SystemModel(load_codecs())
+    shipped_contents()  # before the first frame: later it would keep frames waiting
     clock = WallClock()
     stop = stop_event()
     start_s = clock.now_s()

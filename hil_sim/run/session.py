@@ -9,7 +9,7 @@ from dataclasses import replace
 from threading import Event, Thread
 
 from bms.errors import InputError
-from bms.image import calibration_content
+from bms.image import calibration_content, shipped_contents
 from bms.model.model_file import KanModel
 from hil_sim.bus.buses import CanBus, is_serial_line, open_bus, require_room_for_ecu, require_shared
 from hil_sim.bus.database import MessageCodec, load_codecs
@@ -161,6 +161,8 @@ def _run(
     preset, model = settings.preset, settings.model
     is_firmware = settings.controller is ControllerKind.KAN_RCBF
     own = model if is_firmware and isinstance(model, KanModel) else None
+    if own is None and is_firmware:
+        shipped_contents()  # before the first period, which must not wait
     losses = LossWatch()
     charge = Charge(
         preset=preset,
