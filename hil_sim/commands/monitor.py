@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import ExitStack
+from threading import Thread
 from typing import Annotated
 
 import typer
@@ -51,7 +52,8 @@ def monitor(
     require_shared(bus)
     finder = preset_finder(preset)
     model = SystemModel(load_codecs())
-    shipped_contents()  # before the first frame: later it would keep frames waiting
+    # Neither its start nor a frame waits for this.
+    Thread(target=shipped_contents, daemon=True).start()
     clock = WallClock()
     stop = stop_event()
     start_s = clock.now_s()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from bms.image import foreign_content
+from bms.image import foreign_content, shipped_contents
 from codegen import can_database
 from hil_sim.bus.buses import Frame
 from hil_sim.bus.catalog import Message, ResetCause
@@ -84,7 +84,12 @@ class Snapshot:
 
     @property
     def foreign_content(self) -> str | None:
-        """What is wrong with the content of the ECU's calibration, if anything is known to be."""
+        """What is wrong with the content of the ECU's calibration, if anything is known to be.
+
+        Nothing is until somebody has made the shipped contents, for which a screen does not wait.
+        """
+        if not shipped_contents.cache_info().currsize:
+            return None
         content = self.readings["CalibrationContent"].value
         if self.identity is None or content is None:
             return None

@@ -10,7 +10,7 @@ import pytest
 from bms.errors import ModelMismatchError
 from bms.firmware import Ecu
 from bms.firmware._firmware import ffi, lib
-from bms.image import calibration_content
+from bms.image import calibration_content, shipped_contents
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
 from hil_sim.bus.buses import Frame
@@ -54,6 +54,7 @@ def first_answer(ecu: Ecu) -> SystemModel:
 
 
 def test_the_monitor_says_so_in_one_line() -> None:
+    shipped_contents()
     shown = blocks.identity(first_answer(edited_ecu()).snapshot(0.0), PresetInForce(PRESET))
     assert WRONG in shown.plain and len(shown.plain.splitlines()) == 2
     genuine = first_answer(Ecu(DEFAULT_PRESET)).snapshot(0.0)
