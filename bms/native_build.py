@@ -127,7 +127,7 @@ CORE_HEADERS = tuple(
 FIRMWARE = NativeExtension(
     module="bms.firmware._firmware",
     folders=(*CORE_FOLDERS, *_core("image", "host")),
-    headers=(*CORE_HEADERS, *_core("image/image.h", "host/host.h")),
+    headers=(*CORE_HEADERS, *_core("image/image.h", "image/content.h", "host/host.h")),
 )
 
 

@@ -45,6 +45,8 @@ class Ecu:
         self._sent_bytes = ffi.buffer(self._sent)
         config = ffi.new("bms_config_t *", {"calibration": self._calibration})
         lib.bms_init(self._state, config)
+        content = lib.content_of_calibration(self._calibration)
+        lib.bms_tell_start(self._state, ffi.new("bms_start_t *", {"calibration_content": content}))
 
     def receive(self, frame_id: int, data: bytes) -> None:
         """Take any frame with an 11-bit or 29-bit identifier and up to 8 data bytes."""

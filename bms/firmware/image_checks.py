@@ -49,6 +49,12 @@ def application_status(
     return IMAGE_STATUS_NAMES[lib.image_check_application(application.memory, target, ram)]
 
 
+def floor_status(floor: ImagePart, application_header: bytes) -> str:
+    """What is wrong with the application that has this header for a board with this floor."""
+    header = ffi.from_buffer("image_header_t *", application_header[:HEADER_LENGTH])
+    return IMAGE_STATUS_NAMES[lib.image_check_floor(floor.memory, header)]
+
+
 def calibration_status(calibration: ImagePart, application_header: bytes) -> str:
     """What is wrong with a calibration part for the application that has this header.
 

@@ -32,6 +32,8 @@ class Header:
     calibration_length: int
     model_hash: int
     preset_hash: int
+    content_hash: int
+    content_hash_rest: int
 
     @classmethod
     def parse(cls, data: bytes) -> Header:

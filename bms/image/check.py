@@ -9,8 +9,10 @@ from bms.firmware.image_checks import (
     application_status,
     boot_status,
     calibration_status,
+    floor_status,
 )
 from bms.firmware.image_header import Header
+from bms.image.floor import FLOOR_LENGTH
 from bms.image.making import make_command, port_name
 from bms.image.memory_map import ERASED, MEMORY_MAP, TARGETS, Region
 from bms.image.parts import calibration_of
@@ -25,7 +27,14 @@ REASONS = {
     "IMAGE_WRONG_CALIBRATION_LAYOUT": "has another layout than the application was built for",
     "IMAGE_WRONG_FIRMWARE_VERSION": "is for another firmware version",
     "IMAGE_WRONG_CONTENT": "has a header that is not its own",
+    "IMAGE_WRONG_HASH": "was edited after it had been made (SHA-256)",
+    "IMAGE_ROLLED_BACK": "is older than the firmware that this board has had",
+    "IMAGE_WRONG_FLOOR": "has a damaged record of the oldest version that the board takes",
+    "IMAGE_REPEATED_FAULTS": "has restarted by processor faults again and again",
+    "IMAGE_REPEATED_WATCHDOG": "has hung again and again",
+    "IMAGE_REPEATED_RESETS": "has been reset again and again",
 }
+_NEWER = "give a newer one, or take this one by 'bms flash --allow-older'"
 _EXPORT = "make it with 'bms export --preset PRESET --model model.json --out out/export'"
 
 
@@ -55,7 +64,12 @@ def check_application(image: bytes, target: str, origin: str) -> None:
     status = application_status(_part(image, application), TARGETS[target], ram.address, ram.length)
     _require(status, origin, "application", remedy)
     header = Header.parse(image[application.address :])
-    gap = image[application.address + header.length : application.end]
+    floor = MEMORY_MAP.floor
+    _require(floor_status(_part(image, floor), header.pack()), origin, "application", _NEWER)
+    gap = (
+        image[floor.address + FLOOR_LENGTH : floor.end]
+        + image[application.address + header.length : application.end]
+    )
     if gap.strip(bytes([ERASED])):
         raise InputError(f"{origin}: bytes between the parts are not erased; {remedy}")
 

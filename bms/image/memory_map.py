@@ -27,16 +27,18 @@ class MemoryMap:
     """The regions of every microcontroller target."""
 
     boot: Region
+    floor: Region
     application: Region
     calibration: Region
     ram: Region
 
 
 MEMORY_MAP = MemoryMap(
-    boot=Region(0x0000, 6 * 1024),
+    boot=Region(0x0000, 4 * 1024),
+    floor=Region(0x1000, 2 * 1024),
     application=Region(0x1800, 24 * 1024),
     calibration=Region(0x7800, 6 * 1024),
-    ram=Region(0x2000_0000, 8 * 1024),
+    ram=Region(0x2000_0000, 8 * 1024 - 32),
 )
 
 TARGETS = MappingProxyType({"mps2-an385": 385, "mps2-an386": 386})

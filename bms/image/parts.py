@@ -14,7 +14,7 @@ from bms.firmware.image_header import (
     Header,
 )
 from bms.image.memory_map import ERASED, MEMORY_MAP
-from bms.image.seal import sealed_part
+from bms.image.seal import content_hashes, sealed_part
 from bms.model.model_file import KanModel
 from bms.presets import Preset
 
@@ -37,8 +37,18 @@ def calibration_part(preset: Preset, model: KanModel) -> bytes:
         calibration_length=LONGEST_CALIBRATION,
         model_hash=model_hash,
         preset_hash=preset_hash,
+        content_hash=0,
+        content_hash_rest=0,
     )
     return sealed_part(header.pack() + content, model_hash, preset_hash)
+
+
+def calibration_content(preset: Preset, model: KanModel) -> int:
+    """CalibrationContent of an ECU whose calibration is the one that these two make.
+
+    First 32 bits of the SHA-256 of its bytes. Raises what calibration_part raises.
+    """
+    return content_hashes(calibration_bytes(preset, model))[0]
 
 
 def calibration_of(image: bytes) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import zlib
 from dataclasses import replace
 
@@ -14,9 +15,22 @@ _CRC_LENGTH = 4
 
 def sealed_part(part: bytes, model_hash: int, preset_hash: int) -> bytes:
     """A part of which all but CRC and hashes is right, with these filled in."""
-    header = replace(Header.parse(part), model_hash=model_hash, preset_hash=preset_hash)
+    content_hash, rest = content_hashes(part[HEADER_LENGTH:])
+    header = replace(
+        Header.parse(part),
+        model_hash=model_hash,
+        preset_hash=preset_hash,
+        content_hash=content_hash,
+        content_hash_rest=rest,
+    )
     content = header.pack()[CRC_COVERS_FROM:] + part[HEADER_LENGTH:]
     return replace(header, crc32=zlib.crc32(content)).pack() + part[HEADER_LENGTH:]
+
+
+def content_hashes(content: bytes) -> tuple[int, int]:
+    """First two words of the SHA-256 of what follows a header, as the header holds them."""
+    digest = hashlib.sha256(content).digest()
+    return int.from_bytes(digest[:4], "big"), int.from_bytes(digest[4:8], "big")
 
 
 def sealed_boot(boot: bytes) -> bytes:

@@ -1741,3 +1741,110 @@ bool can_db_plan_predicted_time_to_full_is_in_phys_range(double value)
 {
     return ((value >= 0.0) && (value <= 65533.0));
 }
+
+int can_db_start_pack(
+    uint8_t *dst_p,
+    const struct can_db_start_t *src_p,
+    size_t size)
+{
+    if (size < 7u) {
+        return (-EINVAL);
+    }
+
+    memset(&dst_p[0], 0, 7);
+
+    dst_p[0] |= pack_left_shift_u8(src_p->start_crc, 0u, 0xffu);
+    dst_p[1] |= pack_left_shift_u8(src_p->start_counter, 0u, 0x0fu);
+    dst_p[1] |= pack_left_shift_u8(src_p->reset_cause, 4u, 0xf0u);
+    dst_p[2] |= pack_left_shift_u8(src_p->reset_count, 0u, 0xffu);
+    dst_p[3] |= pack_left_shift_u32(src_p->calibration_content, 0u, 0xffu);
+    dst_p[4] |= pack_right_shift_u32(src_p->calibration_content, 8u, 0xffu);
+    dst_p[5] |= pack_right_shift_u32(src_p->calibration_content, 16u, 0xffu);
+    dst_p[6] |= pack_right_shift_u32(src_p->calibration_content, 24u, 0xffu);
+
+    return (7);
+}
+
+int can_db_start_unpack(
+    struct can_db_start_t *dst_p,
+    const uint8_t *src_p,
+    size_t size)
+{
+    if (size < 7u) {
+        return (-EINVAL);
+    }
+
+    dst_p->start_crc = unpack_right_shift_u8(src_p[0], 0u, 0xffu);
+    dst_p->start_counter = unpack_right_shift_u8(src_p[1], 0u, 0x0fu);
+    dst_p->reset_cause = unpack_right_shift_u8(src_p[1], 4u, 0xf0u);
+    dst_p->reset_count = unpack_right_shift_u8(src_p[2], 0u, 0xffu);
+    dst_p->calibration_content = unpack_right_shift_u32(src_p[3], 0u, 0xffu);
+    dst_p->calibration_content |= unpack_left_shift_u32(src_p[4], 8u, 0xffu);
+    dst_p->calibration_content |= unpack_left_shift_u32(src_p[5], 16u, 0xffu);
+    dst_p->calibration_content |= unpack_left_shift_u32(src_p[6], 24u, 0xffu);
+
+    return (0);
+}
+
+int can_db_start_init(struct can_db_start_t *msg_p)
+{
+    if (msg_p == NULL) return -1;
+
+    memset(msg_p, 0, sizeof(struct can_db_start_t));
+
+    return 0;
+}
+
+bool can_db_start_start_crc_is_in_range(uint8_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_start_start_crc_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 255.0));
+}
+
+bool can_db_start_start_counter_is_in_range(uint8_t value)
+{
+    return (value <= 15u);
+}
+
+bool can_db_start_start_counter_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 15.0));
+}
+
+bool can_db_start_reset_cause_is_in_range(uint8_t value)
+{
+    return (value <= 15u);
+}
+
+bool can_db_start_reset_cause_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 15.0));
+}
+
+bool can_db_start_reset_count_is_in_range(uint8_t value)
+{
+    return (value <= 253u);
+}
+
+bool can_db_start_reset_count_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 253.0));
+}
+
+bool can_db_start_calibration_content_is_in_range(uint32_t value)
+{
+    (void)value;
+
+    return (true);
+}
+
+bool can_db_start_calibration_content_is_in_phys_range(double value)
+{
+    return ((value >= 0.0) && (value <= 4294967295.0));
+}

@@ -61,6 +61,7 @@ extern "C" {
 #define CAN_DB_DIAGNOSTICS2_FRAME_ID (0x187u)
 #define CAN_DB_BOOT_REFUSAL_FRAME_ID (0x188u)
 #define CAN_DB_PLAN_FRAME_ID (0x189u)
+#define CAN_DB_START_FRAME_ID (0x18au)
 
 /* Frame lengths in bytes. */
 #define CAN_DB_SYNC_LENGTH (0u)
@@ -79,6 +80,7 @@ extern "C" {
 #define CAN_DB_DIAGNOSTICS2_LENGTH (7u)
 #define CAN_DB_BOOT_REFUSAL_LENGTH (4u)
 #define CAN_DB_PLAN_LENGTH (6u)
+#define CAN_DB_START_LENGTH (7u)
 
 /* Extended or standard frame types. */
 #define CAN_DB_SYNC_IS_EXTENDED (0)
@@ -97,6 +99,7 @@ extern "C" {
 #define CAN_DB_DIAGNOSTICS2_IS_EXTENDED (0)
 #define CAN_DB_BOOT_REFUSAL_IS_EXTENDED (0)
 #define CAN_DB_PLAN_IS_EXTENDED (0)
+#define CAN_DB_START_IS_EXTENDED (0)
 
 /* Frame cycle times in milliseconds. */
 #define CAN_DB_SYNC_CYCLE_TIME_MS (100u)
@@ -115,6 +118,7 @@ extern "C" {
 #define CAN_DB_DIAGNOSTICS2_CYCLE_TIME_MS (500u)
 #define CAN_DB_BOOT_REFUSAL_CYCLE_TIME_MS (100u)
 #define CAN_DB_PLAN_CYCLE_TIME_MS (500u)
+#define CAN_DB_START_CYCLE_TIME_MS (1000u)
 
 /* Signal choices. */
 #define CAN_DB_CHARGE_REQUEST_REQUEST_OFF_CHOICE (0u)
@@ -206,6 +210,18 @@ extern "C" {
 #define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_WRONG_CALIBRATION_LAYOUT_CHOICE (7u)
 #define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_WRONG_FIRMWARE_VERSION_CHOICE (8u)
 #define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_WRONG_CONTENT_CHOICE (9u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_WRONG_HASH_CHOICE (10u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_ROLLED_BACK_CHOICE (11u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_WRONG_FLOOR_CHOICE (12u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_REPEATED_FAULTS_CHOICE (13u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_REPEATED_WATCHDOG_CHOICE (14u)
+#define CAN_DB_BOOT_REFUSAL_FAILED_CHECK_REPEATED_RESETS_CHOICE (15u)
+
+#define CAN_DB_START_RESET_CAUSE_POWER_ON_CHOICE (0u)
+#define CAN_DB_START_RESET_CAUSE_FAULT_CHOICE (1u)
+#define CAN_DB_START_RESET_CAUSE_WATCHDOG_CHOICE (2u)
+#define CAN_DB_START_RESET_CAUSE_OTHER_CHOICE (3u)
+#define CAN_DB_START_RESET_CAUSE_NOT_AVAILABLE_CHOICE (15u)
 
 /* Frame Names. */
 #define CAN_DB_SYNC_NAME "SYNC"
@@ -224,6 +240,7 @@ extern "C" {
 #define CAN_DB_DIAGNOSTICS2_NAME "Diagnostics2"
 #define CAN_DB_BOOT_REFUSAL_NAME "BootRefusal"
 #define CAN_DB_PLAN_NAME "Plan"
+#define CAN_DB_START_NAME "Start"
 
 /* Signal Names. */
 #define CAN_DB_CELL_ELECTRICAL_CELL_ELECTRICAL_CRC_NAME "CellElectricalCrc"
@@ -299,6 +316,11 @@ extern "C" {
 #define CAN_DB_PLAN_PLAN_COUNTER_NAME "PlanCounter"
 #define CAN_DB_PLAN_PLANNED_CURRENT_NAME "PlannedCurrent"
 #define CAN_DB_PLAN_PREDICTED_TIME_TO_FULL_NAME "PredictedTimeToFull"
+#define CAN_DB_START_START_CRC_NAME "StartCrc"
+#define CAN_DB_START_START_COUNTER_NAME "StartCounter"
+#define CAN_DB_START_RESET_CAUSE_NAME "ResetCause"
+#define CAN_DB_START_RESET_COUNT_NAME "ResetCount"
+#define CAN_DB_START_CALIBRATION_CONTENT_NAME "CalibrationContent"
 
 /**
  * Signals in message SYNC.
@@ -966,6 +988,54 @@ struct can_db_plan_t {
      * Offset: 0
      */
     uint16_t predicted_time_to_full;
+};
+
+/**
+ * Signals in message Start.
+ *
+ * What the ECU found when it started: what it runs on, and why it started.
+ *
+ * All signal values are as on the CAN bus.
+ */
+struct can_db_start_t {
+    /**
+     * Range: 0..255 (0..255 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t start_crc;
+
+    /**
+     * Range: 0..15 (0..15 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t start_counter;
+
+    /**
+     * Range: 0..15 (0..15 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t reset_cause;
+
+    /**
+     * Starts with this cause in a row, 0 after power came; 253 means 253 or more.
+     *
+     * Range: 0..253 (0..253 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint8_t reset_count;
+
+    /**
+     * First bits of the SHA-256 of the calibration's bytes as they stand in flash. Who edits it changes this, but not the hashes of Identity. It authenticates nothing. All ones: the ECU does not know it.
+     *
+     * Range: 0..4294967295 (0..4294967295 -)
+     * Scale: 1
+     * Offset: 0
+     */
+    uint32_t calibration_content;
 };
 
 /**
@@ -3165,6 +3235,153 @@ bool can_db_plan_predicted_time_to_full_is_in_range(uint16_t value);
  * @return true if in range, false otherwise.
  */
 bool can_db_plan_predicted_time_to_full_is_in_phys_range(double value);
+
+/**
+ * Pack message Start.
+ *
+ * @param[out] dst_p Buffer to pack the message into.
+ * @param[in] src_p Data to pack.
+ * @param[in] size Size of dst_p.
+ *
+ * @return Size of packed data, or negative error code.
+ */
+int can_db_start_pack(
+    uint8_t *dst_p,
+    const struct can_db_start_t *src_p,
+    size_t size);
+
+/**
+ * Unpack message Start.
+ *
+ * @param[out] dst_p Object to unpack the message into.
+ * @param[in] src_p Message to unpack.
+ * @param[in] size Size of src_p.
+ *
+ * @return zero(0) or negative error code.
+ */
+int can_db_start_unpack(
+    struct can_db_start_t *dst_p,
+    const uint8_t *src_p,
+    size_t size);
+
+/**
+ * Init message fields to default values from Start.
+ *
+ * @param[in] msg_p Message to init.
+ *
+ * @return zero(0) on success or (-1) in case of nullptr argument.
+ */
+int can_db_start_init(struct can_db_start_t *msg_p);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_start_start_crc_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_start_start_crc_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_start_start_counter_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_start_start_counter_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_start_reset_cause_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_start_reset_cause_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_start_reset_count_is_in_range(uint8_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_start_reset_count_is_in_phys_range(double value);
+
+/**
+ * Check that given signal is in allowed range.
+ *
+ * @param[in] value Signal to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_start_calibration_content_is_in_range(uint32_t value);
+
+/**
+ * Check that given physical value is in allowed range before encoding.
+ *
+ * Use this BEFORE calling _encode() to avoid silent integer overflow:
+ *   encode(-1.0) on a [0,100] signal wraps to 255 and passes is_in_range().
+ *   is_in_phys_range(-1.0) correctly returns false.
+ *
+ * @param[in] value Physical signal value to check.
+ *
+ * @return true if in range, false otherwise.
+ */
+bool can_db_start_calibration_content_is_in_phys_range(double value);
 
 
 #ifdef __cplusplus

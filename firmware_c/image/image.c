@@ -3,6 +3,7 @@
 #include <stddef.h>
 
 #include "calibration.h"
+#include "content.h"
 
 #define CRC32_START 0xFFFFFFFFu
 #define CRC_COVERS_FROM offsetof(image_header_t, length)
@@ -10,10 +11,11 @@
 /* What every layout begins with: layout and hashes. */
 #define SHORTEST_CALIBRATION \
     ((uint32_t)(sizeof(image_header_t) + offsetof(bms_calibration_t, sampling_period_s)))
+#define ERASED 0xFFFFFFFFu
 #define THUMB_BIT 1u
 #define STACK_ALIGNMENT 8u
 
-typedef char header_has_no_padding[(sizeof(image_header_t) == 40u) ? 1 : -1];
+typedef char header_has_no_padding[(sizeof(image_header_t) == 48u) ? 1 : -1];
 typedef char header_ends_before_the_vectors[(sizeof(image_header_t) <= IMAGE_VECTORS_OFFSET) ? 1
                                                                                              : -1];
 typedef char calibration_stays_aligned[(sizeof(image_header_t) % 8u == 0u) ? 1 : -1];
@@ -36,6 +38,13 @@ uint32_t image_crc32(const uint8_t *bytes, uint32_t length)
     return ~crc;
 }
 
+static bool has_its_content(const image_header_t *header, const uint8_t *part)
+{
+    uint32_t hash[2];
+    content_hash(&part[sizeof *header], header->length - (uint32_t)sizeof *header, hash);
+    return (hash[0] == header->content_hash) && (hash[1] == header->content_hash_rest);
+}
+
 static const image_header_t *header_of(const image_memory_t *place)
 {
     return (const image_header_t *)(const void *)place->bytes;
@@ -55,7 +64,10 @@ static image_status_t check_part(const image_memory_t *place, uint32_t magic, ui
         header->crc32) {
         return IMAGE_WRONG_CRC;
     }
-    return (header->header_layout == IMAGE_HEADER_LAYOUT) ? IMAGE_OK : IMAGE_WRONG_HEADER_LAYOUT;
+    if (header->header_layout != IMAGE_HEADER_LAYOUT) {
+        return IMAGE_WRONG_HEADER_LAYOUT;
+    }
+    return has_its_content(header, place->bytes) ? IMAGE_OK : IMAGE_WRONG_HASH;
 }
 
 image_status_t image_check_boot(const image_memory_t *place)
@@ -97,10 +109,16 @@ image_status_t image_check_application(const image_memory_t *place, uint32_t tar
     return (is_stack_right && is_start_right) ? IMAGE_OK : IMAGE_WRONG_VECTORS;
 }
 
-/* Of a calibration nothing is read behind the tables of its model. */
-static uint32_t used_length(const bms_calibration_t *calibration)
+image_status_t image_check_floor(const image_memory_t *place, const image_header_t *application)
 {
-    return (uint32_t)offsetof(bms_calibration_t, kan) + kan_model_length(&calibration->kan);
+    const image_floor_t *floor = (const image_floor_t *)(const void *)place->bytes;
+    if ((floor->version == ERASED) && (floor->inverted_version == ERASED)) {
+        return IMAGE_OK;
+    }
+    if (floor->inverted_version != ~floor->version) {
+        return IMAGE_WRONG_FLOOR;
+    }
+    return (application->firmware_version >= floor->version) ? IMAGE_OK : IMAGE_ROLLED_BACK;
 }
 
 image_status_t image_check_calibration(const image_memory_t *place,
@@ -122,7 +140,7 @@ image_status_t image_check_calibration(const image_memory_t *place,
     const bms_calibration_t *calibration =
         (const bms_calibration_t *)(const void *)&place->bytes[sizeof *header];
     return ((calibration->layout == header->calibration_layout) &&
-            (header->length == sizeof *header + used_length(calibration)) &&
+            (header->length == sizeof *header + content_calibration_length(calibration)) &&
             (calibration->model_hash == header->model_hash) &&
             (calibration->preset_hash == header->preset_hash))
                ? IMAGE_OK

@@ -28,7 +28,7 @@ extern "C" {
 #endif
 
 #define BMS_FIRMWARE_VERSION 4
-#define BMS_TRANSMITTED_MESSAGES 9
+#define BMS_TRANSMITTED_MESSAGES 10
 
 typedef enum {
     BMS_INIT = 0,
@@ -43,10 +43,18 @@ typedef struct {
     const bms_calibration_t *calibration; /* must outlive the bms_t */
 } bms_config_t;
 
+/* What a port knows of the start; all ones where it does not know. */
+typedef struct {
+    uint32_t calibration_content; /* first 32 bits of the SHA-256 of the calibration's bytes */
+    uint8_t reset_cause;          /* ResetCause of the database */
+    uint8_t reset_count;          /* starts with that cause in a row */
+} bms_start_t;
+
 typedef struct {
     const bms_calibration_t *calibration;
     bms_state_t state;
     uint32_t periods;
+    bms_start_t start;
     codec_measurement_t measurement;
     network_t network;
     pace_t pace;
@@ -77,6 +85,9 @@ typedef struct {
 
 /* A missing or invalid calibration leads to the fault state, for good. */
 void bms_init(bms_t *bms, const bms_config_t *config);
+
+/* Between bms_init and the first step: what is said on the bus of the start. */
+void bms_tell_start(bms_t *bms, const bms_start_t *start);
 
 /* Takes any frame; foreign ones are ignored. */
 void bms_receive(bms_t *bms, const can_frame_t *frame);

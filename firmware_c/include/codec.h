@@ -82,6 +82,9 @@ typedef struct {
     uint32_t model_hash;
     uint16_t preset_hash;
     uint8_t firmware_version;
+    uint32_t calibration_content;
+    uint8_t reset_cause;
+    uint8_t reset_count;
     uint8_t state;
     float planned_A;                /* NaN without a plan, as is the next one */
     float predicted_time_to_full_s;

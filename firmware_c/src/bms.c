@@ -21,9 +21,12 @@ static const rcbf_decision_t NO_DECISION = {
     0.0f, false, RCBF_INVALID, NAN, NAN, { NAN, NAN, NAN, NAN }
 };
 
+static const bms_start_t UNKNOWN_START = { UINT32_MAX, UINT8_MAX, UINT8_MAX };
+
 void bms_init(bms_t *bms, const bms_config_t *config)
 {
     *bms = (bms_t){ .state = BMS_INIT, .estimate = { NAN, false }, .decision = NO_DECISION };
+    bms->start = UNKNOWN_START;
     monitor_reset(&bms->monitor);
     history_reset(&bms->history);
     thermal_reset(&bms->thermal);
@@ -35,6 +38,11 @@ void bms_init(bms_t *bms, const bms_config_t *config)
             family_reset(&bms->family, &bms->calibration->family);
         }
     }
+}
+
+void bms_tell_start(bms_t *bms, const bms_start_t *start)
+{
+    bms->start = *start;
 }
 
 void bms_receive(bms_t *bms, const can_frame_t *frame)
@@ -264,6 +272,9 @@ static void queue_frames(bms_t *bms)
                                       ? (bms->calibration->preset_hash >> 16u)
                                       : 0u),
         .firmware_version = BMS_FIRMWARE_VERSION,
+        .calibration_content = bms->start.calibration_content,
+        .reset_cause = bms->start.reset_cause,
+        .reset_count = bms->start.reset_count,
         .planned_A = -bms->planner.planned_A,
         .predicted_time_to_full_s = bms->planner.time_to_full_s,
     };

@@ -192,6 +192,16 @@ static void write_identity(const codec_report_t *report, uint8_t *data)
     (void)can_db_identity_pack(data, &message, CAN_DB_IDENTITY_LENGTH);
 }
 
+static void write_start(const codec_report_t *report, uint8_t *data)
+{
+    const struct can_db_start_t message = {
+        .reset_cause = code(report->reset_cause, FOUR_BITS),
+        .reset_count = report->reset_count,
+        .calibration_content = report->calibration_content,
+    };
+    (void)can_db_start_pack(data, &message, CAN_DB_START_LENGTH);
+}
+
 static void write_plan(const codec_report_t *report, uint8_t *data)
 {
     const struct can_db_plan_t message = {
@@ -222,6 +232,7 @@ CODEC_APART void codec_write(uint32_t index, const codec_report_t *report, can_f
         [CAN_TRANSMITTED_NETWORK_DIAGNOSTICS] = write_network_diagnostics,
         [CAN_TRANSMITTED_DIAGNOSTICS2] = write_more_diagnostics,
         [CAN_TRANSMITTED_IDENTITY] = write_identity,
+        [CAN_TRANSMITTED_START] = write_start,
         [CAN_TRANSMITTED_PLAN] = write_plan,
         [CAN_TRANSMITTED_CHARGE_COMMAND] = write_command,
     };

@@ -35,6 +35,12 @@ def flash(
         Path | None,
         typer.Option("--flash", help="File of the flash. Default: build/flash/BOARD.bin."),
     ] = None,
+    allow_older: Annotated[
+        bool,
+        typer.Option(
+            "--allow-older", help="Take firmware that is older than what the board has had."
+        ),
+    ] = False,
     port: Annotated[
         int,
         typer.Option(
@@ -59,7 +65,7 @@ def flash(
     board = board_name(target)
     memory = Flash(flash_file or Path("build/flash") / f"{board}.bin", board)
     if image is not None or calibration is not None:
-        memory.program(image, calibration)
+        memory.program(image, calibration, allow_older)
     application, present = memory.headers()
     report: dict[str, str | int] = {
         "target": target,
@@ -69,6 +75,7 @@ def flash(
         "calibration_length_bytes": present.length,
         "model_hash": f"{present.model_hash:08x}",
         "preset_hash": f"{present.preset_hash:08x}",
+        "calibration_content": f"{present.content_hash:08x}",
     }
     if not start:
         _print(report, as_json)
@@ -90,7 +97,8 @@ def _print(report: dict[str, str | int], as_json: bool) -> None:
         return
     print(
         "{flash}: firmware version {firmware_version} ({application_length_bytes} bytes), model "
-        "{model_hash}, preset {preset_hash} ({calibration_length_bytes} bytes)".format(**report)
+        "{model_hash}, preset {preset_hash} ({calibration_length_bytes} bytes, content "
+        "{calibration_content})".format(**report)
     )
     if "bus" in report:
         print(f"{report['target']} runs on bus {report['bus']}; Ctrl-C ends it", flush=True)

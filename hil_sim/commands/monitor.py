@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import ExitStack
+from threading import Thread
 from typing import Annotated
 
 import typer
@@ -11,6 +12,7 @@ from rich.console import Console
 from rich.live import Live
 
 from bms.commands.options import preset_option
+from bms.image import shipped_contents
 from hil_sim.bus.buses import require_shared
 from hil_sim.bus.database import load_codecs
 from hil_sim.commands import options
@@ -50,6 +52,8 @@ def monitor(
     require_shared(bus)
     finder = preset_finder(preset)
     model = SystemModel(load_codecs())
+    # Neither its start nor a frame waits for this.
+    Thread(target=shipped_contents, daemon=True).start()
     clock = WallClock()
     stop = stop_event()
     start_s = clock.now_s()

@@ -19,6 +19,7 @@ from hil_sim.commands.replay_output import ReplayReport, builds_json, print_buil
 from hil_sim.logs import Selection, usable_format
 from hil_sim.replay.builds import compare_builds, logs_in
 from hil_sim.replay.comparison import compare
+from hil_sim.replay.content import foreign_content_of
 from hil_sim.replay.engine import replay as replay_recording
 from hil_sim.replay.engine import write_replayed
 from hil_sim.replay.identity import choose_pair, identity_to_ignore
@@ -112,6 +113,7 @@ def _replay(
         preset=ecu.preset.name,
         model_hash=ecu.model.hash[:8],
         is_identity_compared=not ignored,
+        foreign_content=foreign_content_of(recording, ecu.preset, ecu.model),
     )
     if as_json:
         print(json.dumps(report.to_json(), indent=2))

@@ -31,6 +31,8 @@ class ReplayReport:
     preset: str
     model_hash: str
     is_identity_compared: bool
+    foreign_content: str | None
+    """What is wrong with the content of the recorded ECU's calibration, if anything."""
 
     def to_json(self) -> dict[str, Any]:
         """Everything, with units in the keys."""
@@ -43,6 +45,7 @@ class ReplayReport:
             "preset": self.preset,
             "model_hash": self.model_hash,
             "identity_compared": self.is_identity_compared,
+            "foreign_content": self.foreign_content,
             "lock_step": self.recording.lock_step,
             "periods": comparison.periods,
             "differing_periods": comparison.differing_periods,
@@ -64,6 +67,8 @@ class ReplayReport:
             _say(console, f"not read: {described(self.recording.unread)}")
         if not self.is_identity_compared:
             _say(console, "its ECU had another preset or model, so Identity is not compared")
+        if self.foreign_content is not None:
+            _say(console, f"its ECU: {self.foreign_content}")
         if comparison.first is None:
             _say(console, "every frame of the ECU is the same")
             return

@@ -31,7 +31,7 @@ _RECEIVER_STYLES = {ReportedState.VALID.label: "green", ReportedState.INVALID.la
 _NOT_LIMITING = (ActiveConstraint.NONE.label, ActiveConstraint.INVALID.label, wording.NOT_AVAILABLE)
 _WRONG = "bold red"
 # What an undisturbed charge does without takes no room until it comes.
-_SELDOM = (*get_args(OptionalName), Message.PLAN, Message.BOOT_REFUSAL)
+_SELDOM = (*get_args(OptionalName), Message.PLAN, Message.START, Message.BOOT_REFUSAL)
 
 
 def header(snapshot: Snapshot, bus: str) -> Table:
@@ -71,6 +71,9 @@ def identity(snapshot: Snapshot, in_force: PresetInForce) -> Text:
                 f"{name} ({known.preset_hash})"
             )
         )
+    for wrong in (snapshot.foreign_content, snapshot.restarts):
+        if wrong is not None:
+            lines.append(Text(wrong, _WRONG))
     if in_force.remark:
         lines.append(Text(in_force.remark, "yellow"))
     return Text("\n", no_wrap=True, overflow="ellipsis").join(lines)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from bms.image import foreign_content, shipped_contents
 from codegen import can_database
 from hil_sim.bus.buses import Frame
-from hil_sim.bus.catalog import Message
+from hil_sim.bus.catalog import Message, ResetCause
 from hil_sim.bus.database import MessageCodec, Values
 from hil_sim.bus.fault_bits import FaultBits
 from hil_sim.bus.foreign import ForeignFrame
@@ -80,6 +81,28 @@ class Snapshot:
         if part.is_stale or (part.value is None and check.value is None):
             return None
         return refusal_text(part.value, check.value)
+
+    @property
+    def foreign_content(self) -> str | None:
+        """What is wrong with the content of the ECU's calibration, if anything is known to be.
+
+        Nothing is until somebody has made the shipped contents, for which a screen does not wait.
+        """
+        if not shipped_contents.cache_info().currsize:
+            return None
+        content = self.readings["CalibrationContent"].value
+        if self.identity is None or content is None:
+            return None
+        known = self.identity
+        return foreign_content(known.model_hash, known.preset_hash, int(content))
+
+    @property
+    def restarts(self) -> str | None:
+        """Why and how often in a row the ECU has started; None for a start with the power."""
+        cause, count = self.readings["ResetCause"].value, self.readings["ResetCount"].value
+        if cause in (None, ResetCause.POWER_ON, ResetCause.NOT_AVAILABLE) or count is None:
+            return None
+        return f"the ECU has restarted, {count:g} in a row: {self.name('ResetCause')}"
 
     @property
     def is_lock_step(self) -> bool:

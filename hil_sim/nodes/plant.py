@@ -41,6 +41,7 @@ _REPORTS = (
     Message.DIAGNOSTICS2,
     Message.PLAN,
     Message.IDENTITY,
+    Message.START,
     Message.BOOT_REFUSAL,
 )
 _STATES = {state.value: state.label for state in catalog.CommandState}

@@ -31,17 +31,23 @@ def choose_pair(
 
 
 def identity_to_ignore(recording: Recording, preset: Preset, model: KanModel) -> tuple[int, ...]:
-    """Identifier of the Identity message when the replay was asked for another preset or model.
+    """Identifiers of what says who the ECU is, for a replay with another preset or model.
 
     Then it differs by intent, and only what follows from that is of interest.
     """
+    if is_of_pair(recording, preset, model):
+        return ()
+    return tuple(recording.database[name].frame_id for name in (Message.IDENTITY, Message.START))
+
+
+def is_of_pair(recording: Recording, preset: Preset, model: KanModel) -> bool:
+    """Whether the recorded ECU said that it has this preset and model."""
     recorded = _first_identity(recording)
-    is_same = (
+    return (
         recorded is not None
         and model.hash.startswith(recorded.model_hash)
         and preset.hash.startswith(recorded.preset_hash)
     )
-    return () if is_same else (recording.database[Message.IDENTITY].frame_id,)
 
 
 def recorded_identity(recording: Recording) -> Identity:

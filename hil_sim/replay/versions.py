@@ -26,6 +26,18 @@ def first_identity(
     return None
 
 
+def first_content(
+    frames: Iterable[Frame | LogFrame], database: Mapping[str, MessageCodec]
+) -> int | None:
+    """CalibrationContent of the first Start among frames with 11-bit identifiers, if any."""
+    codec = database[Message.START]
+    for frame in frames:
+        if frame.frame_id == codec.frame_id and (values := codec.decode(frame.data)):
+            content = values.get("CalibrationContent")
+            return None if content is None else int(content)
+    return None
+
+
 def require_version(
     path: Path, frames: Iterable[LogFrame], database: Mapping[str, MessageCodec]
 ) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bms.errors import BusError, ModelMismatchError
+from bms.image import UNKNOWN_CONTENT, content_text, foreign_content
 from bms.presets import Preset
 from hil_sim.bus.catalog import CommandState, FirstFault, Mode
 from hil_sim.bus.identity import Identity
@@ -52,6 +53,9 @@ class Charge:
     ends_early: bool = True
     model_hash: str | None = None
     """The model that the ECU has to have; None for any."""
+    content: int | None = None
+    """The content that its calibration has to have, as the ECU counts it; None for that of the
+    shipped model and preset which the ECU names, and any where these do not ship."""
     plug_in_soc: float | None = None
     """State of charge that the charger tells the ECU; None for the true one."""
     progress: Progress = lambda soc: None
@@ -63,6 +67,7 @@ class Charge:
         self.steps = 0
         self.identity: Identity | None = None
         self._heard_identity: Identity | None = None
+        self._is_content_known = False
         self.error_bound_K: float | None = None
         self.first_fault: int | None = None
         self._edge: int | None = None
@@ -129,6 +134,7 @@ class Charge:
         if self._edge is not None or self.steps < OFF_PERIODS:
             return
         is_known = self.model_hash is None or self.identity is not None
+        is_known = is_known and (self.content is None or self._is_content_known)
         if answer.state == CommandState.STANDBY.label and is_known:
             self._edge = self.steps
             return
@@ -136,7 +142,7 @@ class Charge:
         if self.steps >= (STARTING_PERIODS if is_starting else READY_PERIODS):
             raise BusError(
                 f"the ECU is not ready after {self.steps} periods (state: {answer.state or 'none'}"
-                f"{'' if is_known else ', model unknown'}); "
+                f"{'' if is_known else ', model or content unknown'}); "
                 "see the fault bits of its Diagnostics message"
             )
 
@@ -162,6 +168,10 @@ class Charge:
                 self._check(identity)
                 self.identity = identity
             self._heard_identity = identity
+        content = answer.value("CalibrationContent")
+        if content is not None and content != UNKNOWN_CONTENT:
+            self._check_content(int(content))
+            self._is_content_known = True
 
     def _check(self, identity: Identity) -> None:
         if identity.other_version is not None:
@@ -181,6 +191,17 @@ class Charge:
                 "that model: 'bms export --preset PRESET --model MODEL --out out/export' and "
                 "'bms flash --calibration out/export/calibration.bin'"
             )
+
+    def _check_content(self, content: int) -> None:
+        """Model and preset by hash are what the calibration was made from, not what it is."""
+        wrong: str | None = None
+        if self.content is not None and content != self.content:
+            wrong = content_text(content, self.content)
+        elif self.content is None and self.identity is not None:
+            known = self.identity
+            wrong = foreign_content(known.model_hash, known.preset_hash, content)
+        if wrong is not None:
+            raise ModelMismatchError(f"the ECU gets no charge: {wrong}")
 
     def _stop_reason(self, answer: Answer) -> str | None:
         if self._edge is None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from threading import Event, Thread
 
 from bms.errors import InputError
+from bms.image import calibration_content, shipped_contents
 from bms.model.model_file import KanModel
 from hil_sim.bus.buses import CanBus, is_serial_line, open_bus, require_room_for_ecu, require_shared
 from hil_sim.bus.database import MessageCodec, load_codecs
@@ -159,6 +160,9 @@ def _run(
 ) -> RunResult:
     preset, model = settings.preset, settings.model
     is_firmware = settings.controller is ControllerKind.KAN_RCBF
+    own = model if is_firmware and isinstance(model, KanModel) else None
+    if own is None and is_firmware:
+        shipped_contents()  # before the first period, which must not wait
     losses = LossWatch()
     charge = Charge(
         preset=preset,
@@ -176,7 +180,8 @@ def _run(
         injection=injection,
         max_time_s=settings.max_time_s,
         ends_early=settings.ends_early,
-        model_hash=model.hash if is_firmware and isinstance(model, KanModel) else None,
+        model_hash=own.hash if own else None,
+        content=calibration_content(preset, own) if own else None,
         plug_in_soc=settings.true_cell.plug_in_soc if settings.true_cell else None,
         progress=progress,
         mode=settings.mode if is_firmware else None,

@@ -13,9 +13,12 @@ from bms.image import (
     check_application,
     check_calibration,
     check_image,
+    floor_of,
+    foreign_content,
     make_command,
     port_name,
     with_calibration,
+    with_floor,
 )
 
 _LINKED_FILES = {b"\x7fELF": "an ELF file", b":": "an Intel HEX file"}
@@ -28,16 +31,25 @@ class Flash:
         self.path = path
         self._target = target
 
-    def program(self, image: Path | None = None, calibration: Path | None = None) -> None:
+    def program(
+        self,
+        image: Path | None = None,
+        calibration: Path | None = None,
+        allow_older: bool = False,
+    ) -> None:
         """Take over a whole image, a calibration part, or both at once.
 
-        Raises InputError for what the boot stage would not start.
+        From then on the board takes no older firmware; with allow_older it takes this one, however
+        old it is. Raises InputError for what the boot stage would not start, and for a calibration
+        whose content is not that of the model and preset that it names, where these ship.
         """
         content = self._content() if image is None else self._read(image)
         for start, kind in _LINKED_FILES.items():
             if content.startswith(start):
                 raise InputError(f"{image}: is {kind}; give the binary that lies beside it")
         origin = str(image or self.path)
+        if image is not None:
+            content = self._with_own_floor(content, allow_older)
         if calibration is None:
             check_image(content, self._target, origin)
         else:
@@ -45,6 +57,11 @@ class Flash:
             check_application(content, self._target, origin)
             check_calibration(part, content, str(calibration))
             content = with_calibration(content, part)
+        present = Header.parse(calibration_of(content))
+        hashes = f"{present.model_hash:08x}", f"{present.preset_hash:08x}"
+        foreign = foreign_content(*hashes, present.content_hash)
+        if foreign is not None:
+            raise InputError(f"{calibration or origin}: {foreign}")
         self._write(content)
 
     def headers(self) -> tuple[Header, Header]:
@@ -53,6 +70,31 @@ class Flash:
         check_image(image, self._target, str(self.path))
         application = image[MEMORY_MAP.application.address :]
         return Header.parse(application), Header.parse(calibration_of(image))
+
+    def _with_own_floor(self, image: bytes, allow_older: bool) -> bytes:
+        """The image with the oldest version that the board takes from now on.
+
+        A board whose record is damaged takes none without being asked to; an image with a damaged
+        one is left as it is, and so refused.
+        """
+        start = MEMORY_MAP.application.address
+        if len(image) < MEMORY_MAP.application.end:
+            return image  # is refused for its length
+        version = Header.parse(image[start:]).firmware_version
+        if allow_older:
+            return with_floor(image, version)
+        try:
+            given = floor_of(image)
+        except ValueError:
+            return image
+        try:
+            present = floor_of(self._content()) if self.path.exists() else 0
+        except ValueError as error:
+            raise InputError(
+                f"{self.path}: the oldest firmware that the board takes is not known ({error}); "
+                "take this one all the same by --allow-older"
+            ) from None
+        return with_floor(image, max(version, given, present))
 
     def _content(self) -> bytes:
         if not self.path.exists():

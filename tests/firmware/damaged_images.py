@@ -2,30 +2,45 @@
 
 from __future__ import annotations
 
+import hashlib
 import struct
 import zlib
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bms.image import MEMORY_MAP, TARGETS, Header
+from bms.image import MEMORY_MAP, TARGETS, Header, with_floor
 
 BOARD = "mps2-an386"
-HEADER_LENGTH, CRC_COVERS_FROM, VECTORS = 40, 8, 128
+HEADER_LENGTH, CRC_COVERS_FROM, VECTORS = 48, 8, 128
 BOOT, APPLICATION, CALIBRATION = MEMORY_MAP.boot, MEMORY_MAP.application, MEMORY_MAP.calibration
+FLOOR = MEMORY_MAP.floor
 RAM = MEMORY_MAP.ram
 
 
 def resealed(part: bytes, **changes: int) -> bytes:
-    """The part with other header fields and a CRC that fits."""
+    """The part with other header fields, and a CRC and a hash that fit."""
+    end = changes.get("length", Header.parse(part).length)
+    digest = hashlib.sha256(part[HEADER_LENGTH:end]).digest()
+    high, low = struct.unpack_from(">2I", digest)
+    return recounted(part, content_hash=high, content_hash_rest=low, **changes)
+
+
+def recounted(part: bytes, **changes: int) -> bytes:
+    """The part with other header fields and a CRC that fits, whatever its hash says."""
     header = replace(Header.parse(part), **changes)
     content = header.pack()[CRC_COVERS_FROM:] + part[HEADER_LENGTH:]
     return replace(header, crc32=zlib.crc32(content)).pack() + part[HEADER_LENGTH:]
 
 
 def patched(part: bytes, offset: int, *words: int) -> bytes:
-    """The part with other words at an offset and a CRC that fits."""
+    """The part with other words at an offset, and a CRC and a hash that fit."""
     new = struct.pack(f"<{len(words)}I", *words)
     return resealed(part[:offset] + new + part[offset + len(new) :])
+
+
+def edited(part: bytes, offset: int) -> bytes:
+    """The part with another byte, and a CRC that somebody has redone."""
+    return recounted(flipped(part, 8 * offset))
 
 
 def flipped(image: bytes, bit: int) -> bytes:
@@ -43,7 +58,7 @@ def parts(image: bytes) -> tuple[bytes, bytes]:
 
 def with_parts(image: bytes, application: bytes, calibration: bytes) -> bytes:
     """The image with other parts."""
-    boot = image[: BOOT.end]
+    boot = image[: APPLICATION.address]
     return boot + application.ljust(APPLICATION.length, b"\xff") + calibration
 
 
@@ -78,7 +93,7 @@ def damaged_images(image: bytes) -> dict[str, Damaged]:
     swapped = with_parts(image, calibration, application)
     erased = bytes([0xFF])
     return {
-        "boot stage with a flipped bit": Damaged(flipped(image, 8 * 5500), "BOOT", "WRONG_CRC"),
+        "boot stage with a flipped bit": Damaged(flipped(image, 8 * 3990), "BOOT", "WRONG_CRC"),
         "no application": bad_application("NO_MAGIC", b""),
         "calibration in the application's place": Damaged(swapped, "APPLICATION", "NO_MAGIC"),
         "application too long": bad_application(
@@ -102,7 +117,7 @@ def damaged_images(image: bytes) -> dict[str, Damaged]:
             "WRONG_CRC", flipped(resealed(application, header_layout=9), 8 * 300)
         ),
         "header of another layout": bad_application(
-            "WRONG_HEADER_LAYOUT", resealed(application, header_layout=2)
+            "WRONG_HEADER_LAYOUT", resealed(application, header_layout=1)
         ),
         "another board": bad_application(
             "WRONG_TARGET", resealed(application, target=TARGETS["mps2-an385"])
@@ -114,6 +129,23 @@ def damaged_images(image: bytes) -> dict[str, Damaged]:
         "start in the header": vectors(top, start + VECTORS - 1),
         "start behind the application": vectors(top, end + 1),
         "start not in Thumb code": vectors(top, entry - 1),
+        "application edited": bad_application("WRONG_HASH", edited(application, 400)),
+        "calibration edited": bad_calibration("WRONG_HASH", edited(calibration, 500)),
+        "first half of the hash": bad_calibration(
+            "WRONG_HASH", recounted(calibration, content_hash=1)
+        ),
+        "second half of the hash": bad_calibration(
+            "WRONG_HASH", recounted(calibration, content_hash_rest=1)
+        ),
+        "older than the floor": Damaged(
+            with_floor(image, version + 1), "APPLICATION", "ROLLED_BACK"
+        ),
+        "floor damaged": Damaged(
+            flipped(with_floor(image, version), 8 * FLOOR.address), "APPLICATION", "WRONG_FLOOR"
+        ),
+        "floor half erased": Damaged(
+            flipped(image, 8 * (FLOOR.address + 4)), "APPLICATION", "WRONG_FLOOR"
+        ),
         "no calibration": bad_calibration("NO_MAGIC", erased * len(calibration)),
         "calibration missing": bad_calibration("NO_MAGIC", b""),
         "application in the calibration's place": bad_calibration("NO_MAGIC", application[:3000]),
@@ -129,7 +161,7 @@ def damaged_images(image: bytes) -> dict[str, Damaged]:
         ),
         "calibration damaged": bad_calibration("WRONG_CRC", flipped(calibration, 8 * 500)),
         "calibration header of another layout": bad_calibration(
-            "WRONG_HEADER_LAYOUT", resealed(calibration, header_layout=2)
+            "WRONG_HEADER_LAYOUT", resealed(calibration, header_layout=1)
         ),
         "calibration of another layout": bad_calibration(
             "WRONG_CALIBRATION_LAYOUT", resealed(calibration, calibration_layout=layout - 1)
@@ -177,6 +209,10 @@ class BootStage:
         if status != lib.IMAGE_OK:
             return "APPLICATION", self._name(status)
         header = self._ffi.cast("image_header_t *", application.bytes)
+        floor = self._place(image, FLOOR.address, FLOOR.length)
+        status = lib.image_check_floor(floor, header)
+        if status != lib.IMAGE_OK:
+            return "APPLICATION", self._name(status)
         calibration = self._place(image, CALIBRATION.address, CALIBRATION.length)
         status = lib.image_check_calibration(calibration, header)
         return ("", "OK") if status == lib.IMAGE_OK else ("CALIBRATION", self._name(status))
@@ -191,7 +227,7 @@ class BootStage:
         self._memory = [
             *getattr(self, "_memory", ()),
             self._ffi.new("uint64_t[]", length // 8 + 1),
-        ][-3:]
+        ][-4:]
         self._ffi.memmove(self._memory[-1], content, length)
         fields = {"address": address, "length": length}
         place = self._ffi.new("image_memory_t *", fields)

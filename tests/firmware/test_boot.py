@@ -14,6 +14,7 @@ import pytest
 from cantools.database.can.c_source import camel_to_snake_case
 
 from bms.firmware._firmware import lib
+from bms.firmware.image_checks import IMAGE_OK, IMAGE_STATUS_NAMES
 from codegen import can_database
 from hil_sim.bus.buses import Frame, open_bus
 from hil_sim.bus.database import load_codecs
@@ -83,7 +84,7 @@ def refusal(frames: list[Frame]) -> tuple[str, str] | None:
     return None
 
 
-STATUSES = [name for name in dir(lib) if name.startswith(("IMAGE_NO_", "IMAGE_WRONG_"))]
+STATUSES = [name for name in IMAGE_STATUS_NAMES.values() if name != IMAGE_OK]
 
 
 def says_no_current_and_why(frames: list[Frame], part: str, status: str) -> None:
@@ -157,7 +158,7 @@ def test_what_is_in_order_is_started(tmp_path: Path) -> None:
     with Emulation(put(image(), tmp_path), BOARD) as board, open_bus(board.bus) as bus:
         assert bus.receive(SILENCE_S) is None, "the application waits for a first frame"
         bus.send(Frame(CODECS["SYNC"].frame_id, b""))
-        answer = [bus.receive(ANSWER_TIMEOUT_S) for _ in range(9)]
+        answer = [bus.receive(ANSWER_TIMEOUT_S) for _ in range(10)]
     assert answer[-1] is not None and answer[-1].frame_id == CODECS["ChargeCommand"].frame_id
     identity = CODECS["Identity"].decode(answer[4].data) if answer[4] else {}
     assert identity["FirmwareVersion"] == lib.BMS_FIRMWARE_VERSION

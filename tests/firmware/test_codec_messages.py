@@ -56,6 +56,9 @@ CODE_FIELDS = {
     "ModelHash": "model_hash",
     "PresetHash": "preset_hash",
     "FirmwareVersion": "firmware_version",
+    "CalibrationContent": "calibration_content",
+    "ResetCause": "reset_cause",
+    "ResetCount": "reset_count",
     "ReportedMessage": "reported_message",
     "ReportedState": "reported_state",
     "WrongCrcFrames": "reported_counts.wrong_crc",
@@ -66,6 +69,7 @@ CODE_FIELDS = {
 }
 FAULT_FIELDS = ("active_faults", "latched_faults")
 BITS = {"active_faults": 32, "latched_faults": 32, "model_hash": 32, "preset_hash": 16}
+BITS |= {"calibration_content": 32}
 FIRST_FAULTS = 20
 FAULT_AND_VERSION = ("ActiveFaults", "LatchedFaults", "MoreFaults", "NetworkVersion")
 

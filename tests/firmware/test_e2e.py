@@ -79,7 +79,7 @@ def test_every_protected_message_has_its_own_data_id_for_every_counter(
 def test_the_ecu_protects_every_message_with_the_data_id_of_its_counter() -> None:
     ecu = Ecu("lin2014")
     seen = set()
-    for period in range(16 * 5 + 5):
+    for period in range(16 * 10):
         ecu.receive(*frame("ChargeMode", period, {"Mode": FASTEST}))  # asks for Plan too
         ecu.step()
         for frame_id, data in ecu.transmit():

@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 
 from bms.firmware import Ecu
+from bms.image import calibration_content
+from bms.model.pair import load_pair
 from bms.native_build import CORE_HEADERS
 from bms.presets import DEFAULT_PRESET
 from tests.firmware.bench import DATABASE, HEALTHY, MEASURED, STATES, frame
@@ -53,6 +55,9 @@ class Port:
         self.bind()
         self.loop = ffi.new("ecu_loop_t *")
         lib.ecu_loop_init(self.loop, ffi.addressof(lib, "BMS_DEFAULT_CALIBRATION"))
+        content = calibration_content(*load_pair(DEFAULT_PRESET, None))
+        start = ffi.new("bms_start_t *", {"calibration_content": content})
+        lib.bms_tell_start(ffi.addressof(self.loop, "bms"), start)
 
     def bind(self) -> None:
         """Make this the board that the C sources know; there is one at a time."""

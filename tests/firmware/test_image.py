@@ -20,7 +20,7 @@ from bms.presets import DEFAULT_PRESET
 from bms.tables import network_tables
 from tests.firmware.ports import BOARDS, CROSS, ROOT, build, built, image, needs_compiler
 
-HEADER_FIELDS = 10
+HEADER_FIELDS = 12
 APPLICATION, CALIBRATION = MEMORY_MAP.application, MEMORY_MAP.calibration
 COMPILER = [f"{CROSS}gcc", "-std=c99", "-mcpu=cortex-m4", "-mthumb", "-Werror"]
 INCLUDES = [f"-I{ROOT / 'firmware_c' / folder}" for folder in ("include", "image")]
@@ -49,7 +49,7 @@ def test_python_knows_the_linker_s_memory_map(target: str, program: str) -> None
     elf = built(target) / ("boot.elf" if program == "boot" else "unsealed.elf")
     lines = (line.split() for line in output(f"{CROSS}nm", elf).splitlines())
     symbols = {name: int(address, 16) for address, _, name in lines}
-    for region in ("boot", "application", "calibration", "ram"):
+    for region in ("boot", "floor", "application", "calibration", "ram"):
         expected = getattr(MEMORY_MAP, region)
         assert symbols[f"image_{region}_start"] == expected.address
         assert symbols[f"image_{region}_end"] == expected.end

@@ -12,11 +12,13 @@ from bms.errors import InputError
 from bms.firmware.image_checks import IMAGE_OK, IMAGE_STATUS_NAMES
 from bms.image import Header, check_image
 from bms.image.check import REASONS
+from bms.image.floor import FLOOR_LENGTH
 from tests.firmware.damaged_images import (
     APPLICATION,
     BOARD,
     BOOT,
     CALIBRATION,
+    FLOOR,
     HEADER_LENGTH,
     BootStage,
     damaged_images,
@@ -27,12 +29,13 @@ from tests.firmware.ports import image, needs_compiler
 
 pytestmark = needs_compiler
 
-SOURCES = [FIRMWARE / "image" / "image.c", FIRMWARE / "src" / "kan.c"]
+SOURCES = [FIRMWARE / "image" / f"{name}.c" for name in ("image", "content", "sha256")]
+SOURCES.append(FIRMWARE / "src" / "kan.c")
 HEADERS = [
     f"include/{name}.h"
     for name in ("kan", "soc", "rcbf", "family", "planner", "thermal", "calibration")
 ]
-HEADERS.append("image/image.h")
+HEADERS += ["image/image.h", "image/content.h"]
 SAMPLE = 1500
 
 # (replaced text, replacement): each takes one check away.
@@ -44,7 +47,13 @@ MUTANTS = {
     "longest length": ("(header->length > place->length)", "(header->length > place->length + 4u)"),
     "CRC": ("        header->crc32) {\n        return IMAGE_WRONG_CRC;", "        header->crc32) {\n"),
     "CRC up to the end": ("header->length - (uint32_t)CRC_COVERS_FROM)", "64u)"),
-    "header layout": ("(header->header_layout == IMAGE_HEADER_LAYOUT) ? IMAGE_OK :", "true ? IMAGE_OK :"),
+    "header layout": ("if (header->header_layout != IMAGE_HEADER_LAYOUT)", "if (false)"),
+    "hash": ("has_its_content(header, place->bytes) ? IMAGE_OK :", "true ? IMAGE_OK :"),
+    "first half of the hash": ("(hash[0] == header->content_hash) &&", ""),
+    "second half of the hash": ("&& (hash[1] == header->content_hash_rest)", ""),
+    "floor": ("(application->firmware_version >= floor->version) ? IMAGE_OK :", "true ? IMAGE_OK :"),
+    "floor's inverse": ("if (floor->inverted_version != ~floor->version)", "if (false)"),
+    "erased floor": ("&& (floor->inverted_version == ERASED)", ""),
     "target": ("if (header->target != target)", "if (target == 0u)"),
     "stack": ("(is_stack_right && is_start_right)", "is_start_right"),
     "stack alignment": ("(stack_top % STACK_ALIGNMENT == 0u) &&", ""),
@@ -54,7 +63,7 @@ MUTANTS = {
     "start in the part": ("header->length - IMAGE_VECTORS_OFFSET);", "place->length);"),
     "calibration layout": ("(header->calibration_layout != application->calibration_layout) ||", ""),
     "calibration length": ("||\n        (header->calibration_length != application->calibration_length)", ""),
-    "end of the tables": ("(header->length == sizeof *header + used_length(calibration)) &&", ""),
+    "end of the tables": ("(header->length == sizeof *header + content_calibration_length(calibration)) &&", ""),
     "firmware version": ("if (header->firmware_version != application->firmware_version)", "if (false)"),
     "model": ("(calibration->model_hash == header->model_hash) &&", ""),
     "preset": ("&&\n            (calibration->preset_hash == header->preset_hash)", ""),
@@ -103,10 +112,13 @@ def test_every_bit_of_a_header_is_protected(boot_stage: BootStage, region: Any) 
 def test_no_bit_of_a_large_sample_goes_unnoticed(boot_stage: BootStage) -> None:
     content, draw = image(), random.Random(1)
     used_end = APPLICATION.address + Header.parse(content[APPLICATION.address :]).length
+    record_end = FLOOR.address + FLOOR_LENGTH
     for bit in draw.sample(range(8 * len(content)), SAMPLE):
         damaged = flipped(content, bit)
         assert not host_takes(damaged), f"bit {bit}"
-        if not used_end <= bit // 8 < APPLICATION.end:  # erased room is no part
+        place = bit // 8
+        erased = used_end <= place < APPLICATION.end or record_end <= place < FLOOR.end
+        if not erased:  # room that no part has
             assert boot_stage.verdict(damaged) != ("", "OK"), f"bit {bit}"
 
 

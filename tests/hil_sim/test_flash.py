@@ -13,7 +13,8 @@ import pytest
 
 from bms.errors import InputError
 from bms.firmware import Ecu
-from bms.image import MEMORY_MAP, calibration_part
+from bms.firmware.image_header import FIRMWARE_VERSION
+from bms.image import MEMORY_MAP, calibration_part, with_floor
 from bms.model.pair import load_pair
 from hil_sim.bus.buses import Frame, open_bus
 from hil_sim.targets import Emulation, Flash
@@ -42,6 +43,11 @@ def lin2014(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("part") / "calibration.bin"
     path.write_bytes(calibration_part(*load_pair("lin2014", None)))
     return path
+
+
+def flashed() -> bytes:
+    """The image as it stands in flash: the board takes no older one from now on."""
+    return with_floor(image(), FIRMWARE_VERSION)
 
 
 def answers(path: Path, periods: int) -> list[list[tuple[int, bytes]]]:
@@ -76,7 +82,7 @@ def test_an_image_is_taken_over_and_described(bms, tmp_path):
     command = ["flash", "--image", built("mps2_an386") / IMAGE, "--flash", path, "--no-start"]
     code, out, _ = bms(*command, "--json")
     report = json.loads(out)
-    assert code == 0 and path.read_bytes() == image()
+    assert code == 0 and path.read_bytes() == flashed()
     preset, model = load_pair("paper_calibrated", None)
     assert report["model_hash"] == model.hash[:8] and report["preset_hash"] == preset.hash[:8]
     assert report["target"] == f"qemu:{BOARD}" and report["flash"] == str(path)
@@ -87,7 +93,7 @@ def test_an_image_is_taken_over_and_described(bms, tmp_path):
 def test_another_model_s_calibration_runs_on_the_same_code(flash, lin2014):
     flash.program(calibration=lin2014)
     present, region = flash.path.read_bytes(), MEMORY_MAP.calibration
-    assert present[: region.address] == image()[: region.address]
+    assert present[: region.address] == flashed()[: region.address]
     assert present[region.address :] == lin2014.read_bytes()
     assert answers(flash.path, 12) == expected("lin2014", 12)
 
@@ -103,7 +109,7 @@ def test_a_bad_image_changes_nothing(flash, tmp_path):
         with pytest.raises(InputError, match=r"bad\.bin: .*; "):
             flash.program(path)
         assert [file.name for file in flash.path.parent.iterdir()] == [flash.path.name]
-        assert flash.path.read_bytes() == image()
+        assert flash.path.read_bytes() == flashed()
 
 
 @pytest.mark.parametrize(
@@ -125,7 +131,7 @@ def test_a_bad_calibration_changes_nothing(flash, lin2014, tmp_path, bms, damage
     code, out, error = bms("flash", "--calibration", path, "--flash", flash.path, "--no-start")
     assert (code, out) == (2, "")
     assert words in error and error.startswith(f"bms: {path}: ") and len(error.splitlines()) == 1
-    assert flash.path.read_bytes() == image()
+    assert flash.path.read_bytes() == flashed()
 
 
 def test_image_and_calibration_are_taken_over_together_or_not_at_all(flash, lin2014, tmp_path):

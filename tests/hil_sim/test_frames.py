@@ -20,7 +20,7 @@ DATABASE = cantools.database.load_string(
 CHARGE_MODE = 4  # as it is reported
 PLANT = ["CellElectrical", "CellThermal", "Coolant", "ChargeRequest", "SYNC"]
 ECU = ["Estimate", "Decision", "DecisionMargins", "Diagnostics", "ChargeCommand"]
-NOW_AND_THEN = ["Identity", "NetworkDiagnostics", "Diagnostics2", "Plan"]
+NOW_AND_THEN = ["Identity", "NetworkDiagnostics", "Diagnostics2", "Plan", "Start"]
 
 
 @pytest.fixture(scope="module")

@@ -62,8 +62,9 @@ def test_everything_is_on_the_screen(charging, database, size):
     ):
         assert re.search(pattern, text), pattern
     rates = {"Identity": "1.0", "NetworkDiagnostics": "2.0", "Diagnostics2": "2.0", "Plan": "2.0"}
+    rates["Start"] = "1.0"
     for codec in database.values():
-        if codec.name in SELDOM or (codec.name == "Plan" and size[1] <= 24):
+        if codec.name in SELDOM or (codec.name in ("Plan", "Start") and size[1] <= 24):
             assert codec.name not in text
             continue
         rate = rates.get(codec.name, "10.0")
@@ -101,7 +102,7 @@ def test_the_four_faults_of_a_plant_that_is_gone_are_all_on_the_screen(database,
 def test_what_came_and_comes_no_more_is_stale(size):
     text = text_of(snapshot_of(FOLDER / "hot_derating.log.gz", 25.0, age_s=200.0), *size)
     assert re.search(r" Derated +stale +socketcan:vcan0 +silent for 3 min", text)
-    assert text.count("stale") == 1 + 5 + 3 + 13 + (size[1] > 24) + 4 + 3
+    assert text.count("stale") == 1 + 5 + 3 + 13 + 2 * (size[1] > 24) + 4 + 3
     assert "━" not in text
 
 

@@ -8,17 +8,21 @@
 #include "image.h"
 #include "refusal.h"
 #include "registers.h"
+#include "restart.h"
 #include "slcan.h"
 
 /* Of the linker script; addresses only. */
 extern const uint8_t image_boot_start[];
 extern const uint8_t image_boot_end[];
+extern const uint8_t image_floor_start[];
+extern const uint8_t image_floor_end[];
 extern const uint8_t image_application_start[];
 extern const uint8_t image_application_end[];
 extern const uint8_t image_calibration_start[];
 extern const uint8_t image_calibration_end[];
 extern const uint8_t image_ram_start[];
 extern const uint8_t image_ram_end[];
+extern restart_record_t restart_record;
 
 int main(void);
 
@@ -26,6 +30,13 @@ static image_memory_t memory_between(const uint8_t *start, const uint8_t *end)
 {
     const image_memory_t memory = { start, (uint32_t)start, (uint32_t)end - (uint32_t)start };
     return memory;
+}
+
+/* From here on an application that hangs, or that never gets so far as to turn, restarts. */
+static void start_watchdog(void)
+{
+    WATCHDOG->LOAD = CORE_CLOCK_HZ / 1000u * WATCHDOG_MS;
+    WATCHDOG->CTRL = WATCHDOG_CTRL_INTERRUPT | WATCHDOG_CTRL_RESET;
 }
 
 static void start_application(const uint8_t *application)
@@ -72,9 +83,22 @@ __attribute__((noreturn)) static void refuse(refusal_part_t part, image_status_t
     }
 }
 
+static image_status_t check_restarts(void)
+{
+    static const image_status_t HOPELESS[] = {
+        [RESTART_POWER_ON] = IMAGE_OK,
+        [RESTART_FAULT] = IMAGE_REPEATED_FAULTS,
+        [RESTART_WATCHDOG] = IMAGE_REPEATED_WATCHDOG,
+        [RESTART_OTHER] = IMAGE_REPEATED_RESETS,
+    };
+    return restart_is_hopeless(&restart_record) ? HOPELESS[restart_record.cause] : IMAGE_OK;
+}
+
 int main(void)
 {
+    restart_begin(&restart_record);
     const image_memory_t boot = memory_between(image_boot_start, image_boot_end);
+    const image_memory_t floor = memory_between(image_floor_start, image_floor_end);
     const image_memory_t application =
         memory_between(image_application_start, image_application_end);
     const image_memory_t calibration =
@@ -87,11 +111,20 @@ int main(void)
         part = REFUSAL_APPLICATION;
     }
     if (status == IMAGE_OK) {
+        status = image_check_floor(
+            &floor, (const image_header_t *)(const void *)image_application_start);
+    }
+    if (status == IMAGE_OK) {
         status = image_check_calibration(
             &calibration, (const image_header_t *)(const void *)image_application_start);
         part = REFUSAL_CALIBRATION;
     }
     if (status == IMAGE_OK) {
+        status = check_restarts();
+        part = REFUSAL_APPLICATION;
+    }
+    if (status == IMAGE_OK) {
+        start_watchdog();
         start_application(image_application_start);
     }
     refuse(part, status);

@@ -64,6 +64,11 @@ void port_start(void)
     SYSTICK->CTRL = SYSTICK_ENABLE | SYSTICK_INTERRUPT | SYSTICK_CORE_CLOCK;
 }
 
+void port_feed_watchdog(void)
+{
+    WATCHDOG->INTCLR = 1u;
+}
+
 bool port_receive(can_frame_t *frame)
 {
     const bool is_received = slcan_link_receive(&serial, frame);

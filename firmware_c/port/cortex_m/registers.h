@@ -27,6 +27,20 @@ typedef struct {
 #define UART_INT_RECEIVE 0x2u
 #define UART_FASTEST_DIVIDER 16u
 
+/* CMSDK APB watchdog: its first step is the non-maskable interrupt, its second one a reset. */
+typedef struct {
+    volatile uint32_t LOAD;
+    volatile uint32_t VALUE;
+    volatile uint32_t CTRL;
+    volatile uint32_t INTCLR; /* any write clears the first step and begins the time anew */
+} watchdog_registers_t;
+
+#define WATCHDOG ((watchdog_registers_t *)0x40008000u)
+#define WATCHDOG_CTRL_INTERRUPT 0x1u
+#define WATCHDOG_CTRL_RESET 0x2u
+/* Long for a loop that turns every millisecond: a machine that emulates the board may be busy. */
+#define WATCHDOG_MS 2000u
+
 /* Armv7-M system timer. */
 typedef struct {
     volatile uint32_t CTRL;

@@ -27,7 +27,7 @@ LDFLAGS := $(CPU) -mthumb -nostartfiles --specs=nano.specs -L$F/linker \
 
 CORE_SOURCES := $(wildcard $F/src/*.c $F/generated/can_*.c)
 APPLICATION_SOURCES := $(CORE_SOURCES) $F/generated/calibration_default.c $(wildcard $F/port/*.c) \
-  $(addprefix $F/port/cortex_m/, startup.c memory.c port.c main.c \
+  $F/boot/restart.c $(addprefix $F/port/cortex_m/, startup.c memory.c port.c main.c \
   application_header.c calibration_header.c)
 BOOT_SOURCES := $F/src/e2e.c $F/src/kan.c $F/generated/can_catalog.c $F/generated/can_db.c \
   $(wildcard $F/image/*.c $F/boot/*.c) $F/port/slcan.c \

@@ -8,6 +8,7 @@
 #include <time.h>
 
 #include "calibration.h"
+#include "content.h"
 #include "ecu_loop.h"
 #include "port.h"
 #include "socketcan.h"
@@ -152,7 +153,11 @@ int main(int count, char **words)
     await_gap();
     printf("ECU on %s: listening\n", arguments.interface);
     (void)fflush(stdout);
+    const bms_start_t start = {
+        .calibration_content = content_of_calibration(&BMS_DEFAULT_CALIBRATION),
+    };
     ecu_loop_init(&loop, &BMS_DEFAULT_CALIBRATION);
+    bms_tell_start(&loop.bms, &start);
     while (!is_stopped && (bus.error == 0) && (silent_ms < arguments.silence_ms)) {
         ecu_loop_turn(&loop);
     }
