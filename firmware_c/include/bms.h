@@ -55,6 +55,7 @@ typedef struct {
     soc_t soc;
     bool soc_known;
     uint8_t ocv_segment; /* of the table, where the last search ended */
+    uint8_t decision_segment; /* and where that for the decision did */
     float open_circuit_voltage_V; /* of one cell's state of charge, where that is known */
     history_t history;
     thermal_t thermal;

@@ -181,15 +181,16 @@ static void decide(bms_t *bms)
     } else if (is_charging(bms)) {
         const rcbf_input_t input = {
             .soc = bms->soc.soc + calibration->soc_error,
-            .core_temperature_K = { .high_K = bms->estimate.core_temperature_K },
-            .surface_temperature_K = { .high_K = bms->surface_temperature_K },
-            .coolant_temperature_K = { .high_K = m->coolant_temperature_K },
+            .core_temperature_K = { bms->estimate.core_temperature_K, 0.0f },
+            .surface_temperature_K = { bms->surface_temperature_K, 0.0f },
+            .coolant_temperature_K = { m->coolant_temperature_K, 0.0f },
             .cooling_power_W = m->cooling_power_W,
             .reference_current_A = bms_wanted_current_A(bms),
         };
         bms->decision = rcbf_solve_steadily(&calibration->rcbf, &input,
-                                            rcbf_open_circuit_voltage_V(&calibration->rcbf,
-                                                                        input.soc),
+                                            rcbf_open_circuit_voltage_near_V(
+                                                &calibration->rcbf, input.soc,
+                                                &bms->decision_segment),
                                             &bms->steadier);
         bms->state = (bms->decision.active == RCBF_NONE) ? BMS_CHARGING : BMS_DERATED;
     }

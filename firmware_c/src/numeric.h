@@ -33,6 +33,12 @@ static inline bool numeric_is_finite(float value)
     return (numeric_bits(value) << 1u) < (NUMERIC_INFINITY_BITS << 1u);
 }
 
+/* By the sign, which -0 and NaN have too. */
+NUMERIC_INLINE bool numeric_is_negative(float value)
+{
+    return (numeric_bits(value) >> 31u) != 0u;
+}
+
 NUMERIC_INLINE float numeric_larger(float a, float b)
 {
     return (a > b) ? a : b;

@@ -97,11 +97,12 @@ static float family_limit_A(const planner_t *planner, const rcbf_constants_t *k,
 }
 
 /* What flows in the mean of the next step of a prediction. */
-static float next_strength_A(const planner_t *planner, const planner_constants_t *constants,
+static float next_strength_A(planner_t *planner, const planner_constants_t *constants,
                              const rcbf_constants_t *cell, const family_constants_t *family)
 {
     const float room_V = cell->max_voltage_V - cell->voltage_margin_V -
-                         rcbf_open_circuit_voltage_V(cell, planner->soc);
+                         rcbf_open_circuit_voltage_near_V(cell, planner->soc,
+                                                          &planner->ocv_segment);
     const float voltage_A = room_V / planner->start.resistance_ohm;
     const float limit_A = (family->is_stated != 0u) ? family_limit_A(planner, cell, family)
                                                     : cell_limit_A(planner, cell, constants->step_s);
@@ -165,6 +166,7 @@ void planner_begin(planner_t *planner)
     planner->is_searching = true;
     planner->age_s = 0.0f;
     planner->tried = 0u;
+    planner->ocv_segment = 0u;
     planner->best.cost = FLT_MAX;
     planner->low_A = LEAST_SHARE * planner->goal.strongest_A;
     planner->high_A = MOST_SHARE * planner->goal.strongest_A;
