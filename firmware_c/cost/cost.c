@@ -50,6 +50,8 @@ typedef struct {
     bms_t bms;
     can_frame_t sent;
     state_t state;
+    uint8_t segment; /* of the voltage's table, as a period keeps it */
+    rcbf_steadier_t steadier;
     family_t family; /* before the period's readings */
     family_reading_t reading;
     float result;
@@ -68,8 +70,11 @@ static void estimate(cost_t *cost)
 
 static void decide(cost_t *cost)
 {
-    cost->result =
-        rcbf_solve(&cost->calibration->rcbf, &cost->state.decision_input).current_A;
+    const rcbf_constants_t *constants = &cost->calibration->rcbf;
+    const rcbf_input_t *input = &cost->state.decision_input;
+    const float voltage_V =
+        rcbf_open_circuit_voltage_near_V(constants, input->soc, &cost->segment);
+    cost->result = rcbf_solve_steadily(constants, input, voltage_V, &cost->steadier).current_A;
 }
 
 static void observe_family(cost_t *cost)
@@ -143,6 +148,7 @@ static ticks_t play_period(cost_t *cost)
         ticks.decision = ticks_of(cost, decide_for_family);
     } else {
         ticks.observation = ticks.nothing;
+        rcbf_steadier_reset(&cost->steadier);
         ticks.decision = ticks_of(cost, decide);
     }
     return ticks;
@@ -155,6 +161,7 @@ static ticks_t play_state(cost_t *cost)
     ticks.observation = ticks.nothing;
     cost->state = cost->record.content.state;
     ticks.estimate = ticks_of(cost, estimate);
+    rcbf_steadier_reset(&cost->steadier);
     ticks.decision = ticks_of(cost, decide);
     return ticks;
 }

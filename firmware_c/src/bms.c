@@ -89,12 +89,10 @@ static void update_estimates(bms_t *bms)
     const bms_calibration_t *calibration = bms->calibration;
     const plausibility_t *limits = &calibration->plausibility;
     const bool is_current_usable = is_usable(bms, CAN_RECEIVED_CELL_ELECTRICAL) &&
-                                   !is_outside(m->current_A, &limits->current_A);
+                                   !is_outside(bms, OUTSIDE_CURRENT);
     const bool is_thermal_fresh = is_usable(bms, CAN_RECEIVED_CELL_THERMAL);
-    const bool is_surface_usable =
-        is_thermal_fresh && !is_outside(m->surface_temperature_K, &limits->surface_temperature_K);
-    const bool is_coolant_usable =
-        is_thermal_fresh && !is_outside(m->coolant_temperature_K, &limits->coolant_temperature_K);
+    const bool is_surface_usable = is_thermal_fresh && !is_outside(bms, OUTSIDE_SURFACE);
+    const bool is_coolant_usable = is_thermal_fresh && !is_outside(bms, OUTSIDE_COOLANT);
     /* Without a usable reading the command is what has most likely flowed. */
     const float current_A = is_current_usable ? m->current_A : bms->command_A;
     if (is_coolant_usable) {
@@ -203,6 +201,7 @@ static void run_period(bms_t *bms)
     if (!bms->has_started) {
         return;
     }
+    bms->outside = bms_readings_outside(bms);
     update_estimates(bms);
     uint32_t symptoms = bms_symptoms(bms);
     if (bms->state == BMS_INIT) {

@@ -1,5 +1,7 @@
 #include "bms_plan.h"
 
+#include <math.h>
+
 #include "bms_symptoms.h"
 #include "numeric.h"
 
@@ -69,7 +71,7 @@ static bool is_other_goal(const bms_t *bms)
     if ((planned_s < 0.0f) || (asked_s < 0.0f)) {
         return (planned_s < 0.0f) != (asked_s < 0.0f);
     }
-    return !(numeric_abs(asked_s - (planned_s - bms->planner.age_s)) <= OTHER_TIME_S);
+    return !(fabsf(asked_s - (planned_s - bms->planner.age_s)) <= OTHER_TIME_S);
 }
 
 void bms_plan(bms_t *bms)

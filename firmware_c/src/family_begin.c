@@ -1,5 +1,7 @@
 #include "family.h"
 
+#include <math.h>
+
 #include "family_tables.h"
 #include "numeric.h"
 
@@ -17,7 +19,7 @@ static float soc_at(const rcbf_constants_t *cell, float voltage_V)
 
 bool family_is_at_rest(const family_constants_t *constants, const family_reading_t *reading)
 {
-    return numeric_abs(reading->current_A) <= 2.0f * constants->current_error_A;
+    return fabsf(reading->current_A) <= 2.0f * constants->current_error_A;
 }
 
 void family_begin(family_t *family, const family_constants_t *constants,

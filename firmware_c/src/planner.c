@@ -1,6 +1,7 @@
 #include "planner.h"
 
 #include <math.h>
+#include <stddef.h>
 
 #include "family_tables.h"
 #include "numeric.h"
@@ -21,11 +22,15 @@ enum { CORE, SURFACE, COOLANT, HEAT, COOLING };
 
 bool planner_constants_are_valid(const planner_constants_t *constants)
 {
-    return (constants->period_s > 0.0f) && (constants->step_s >= constants->period_s) &&
-           (constants->step_s <= FLT_MAX) && (constants->growth_A > 0.0f) &&
-           (constants->growth_A <= FLT_MAX) && (constants->completion_soc > 0.0f) &&
-           (constants->completion_soc <= FLT_MAX) &&
-           numeric_all_finite(constants->response, PLANNER_MASSES * PLANNER_DRIVES);
+    static const numeric_field_t FIELDS[] = {
+        { (uint16_t)offsetof(planner_constants_t, period_s),
+          (uint16_t)(offsetof(planner_constants_t, response) / sizeof(float)), NUMERIC_LEAST,
+          FLT_MAX },
+        { (uint16_t)offsetof(planner_constants_t, response), PLANNER_MASSES * PLANNER_DRIVES,
+          -FLT_MAX, FLT_MAX },
+    };
+    return numeric_fields_are_within(constants, FIELDS, NUMERIC_COUNT(FIELDS)) &&
+           (constants->step_s >= constants->period_s);
 }
 
 void planner_reset(planner_t *planner)
@@ -68,14 +73,14 @@ static float cell_limit_A(const planner_t *planner, const rcbf_constants_t *k, f
     const float core_A =
         curved_A(k->a1_per_s * core_above_surface_K - k->alpha2_per_s * above_K[CORE] -
                    k->core_uncertainty_K_per_s - k->core_margin_K_per_s -
-                   numeric_abs(k->a1_per_s - k->alpha2_per_s) * e_K,
+                   fabsf(k->a1_per_s - k->alpha2_per_s) * e_K,
                k->a2_per_As * core_K, k->a3_K_per_A2s);
     const float surface_A =
         curved_A(k->a4_per_s2 * core_above_surface_K +
                    k->a6_per_s2 * (above_K[COOLANT] - above_K[SURFACE]) +
                    k->alpha3_per_s2 * surface_room_K +
                    k->a10_K_per_Ws2 * planner->start.cooling_power_W - k->delta4_K_per_s2 -
-                   k->surface_margin_K_per_s2 - numeric_abs(k->a4_per_s2) * e_K,
+                   k->surface_margin_K_per_s2 - fabsf(k->a4_per_s2) * e_K,
                k->a8_per_As2 * core_K, -k->a9_K_per_A2s2);
     return numeric_smaller(soc_A, numeric_smaller(core_A, surface_A));
 }
