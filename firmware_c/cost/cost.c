@@ -77,6 +77,12 @@ static void decide(cost_t *cost)
     cost->result = rcbf_solve_steadily(constants, input, voltage_V, &cost->steadier).current_A;
 }
 
+static void decide_on_state(cost_t *cost)
+{
+    cost->result =
+        rcbf_solve(&cost->calibration->rcbf, &cost->state.decision_input).current_A;
+}
+
 static void observe_family(cost_t *cost)
 {
     family_observe(&cost->family, &cost->calibration->family, &cost->calibration->rcbf,
@@ -91,7 +97,7 @@ static void decide_for_family(cost_t *cost)
                        .current_A;
 }
 
-static void run_period(cost_t *cost)
+static void whole_period(cost_t *cost)
 {
     for (uint32_t i = 0u; i < cost->record.frames; i++) {
         bms_receive(&cost->bms, &cost->record.content.frames[i]);
@@ -138,7 +144,8 @@ static ticks_t play_period(cost_t *cost)
     ticks_t ticks = { .nothing = ticks_of(cost, do_nothing) };
     const float commanded_A = cost->bms.command_A;
     cost->family = cost->bms.family;
-    ticks.period = ticks_of(cost, run_period);
+    ticks.period = ticks_of(cost, whole_period);
+    cost->segment = cost->bms.ocv_segment;
     take_state(cost);
     cost->reading = reading_of(&cost->bms);
     cost->reading.command_A = commanded_A;
@@ -161,8 +168,7 @@ static ticks_t play_state(cost_t *cost)
     ticks.observation = ticks.nothing;
     cost->state = cost->record.content.state;
     ticks.estimate = ticks_of(cost, estimate);
-    rcbf_steadier_reset(&cost->steadier);
-    ticks.decision = ticks_of(cost, decide);
+    ticks.decision = ticks_of(cost, decide_on_state);
     return ticks;
 }
 

@@ -140,6 +140,7 @@ static void follow_request(bms_t *bms, uint32_t symptoms)
     } else if ((bms->state == BMS_STANDBY) && bms->may_start && (symptoms == 0u)) {
         soc_set(&bms->soc, bms->measurement.plug_in_soc);
         look_up_voltage(bms);
+        bms->decision_segment = bms->ocv_segment;
         if (has_family(bms)) {
             const family_reading_t reading = reading_of(bms);
             family_begin(&bms->family, &bms->calibration->family, &bms->calibration->rcbf,

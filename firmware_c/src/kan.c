@@ -254,9 +254,13 @@ kan_estimate_t kan_evaluate(const kan_model_t *model, const float *inputs)
     const uint32_t *const last = &model->width[model->layers];
     bool is_spanned = model->spans_reach != 0u;
     do {
-        for (uint32_t to = 0u; to < width[1]; to++) {
-            sums[to] = sum_of_edges(&walk, nodes, &nodes[*width], is_spanned, &in_domain);
-        }
+        const float *const layer_end = &nodes[*width];
+        float *sum = sums;
+        float *const sums_end = &sums[width[1]];
+        do {
+            *sum = sum_of_edges(&walk, nodes, layer_end, is_spanned, &in_domain);
+            sum++;
+        } while (sum < sums_end);
         float *const spent = nodes;
         nodes = sums;
         sums = spent;

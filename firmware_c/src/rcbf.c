@@ -272,9 +272,8 @@ rcbf_decision_t rcbf_solve_steadily(const rcbf_constants_t *constants, const rcb
     decision.current_A = u;
     decision.margins[0] = voltage.constant + u * voltage.linear;
     decision.margins[1] = soc.constant + u * soc.linear;
-    for (uint32_t i = 0u; i < 2u; i++) {
-        decision.margins[2u + i] = least_value_at(&robust[i], u);
-    }
+    decision.margins[2] = least_value_at(&robust[0], u);
+    decision.margins[3] = least_value_at(&robust[1], u);
     return decision;
 }
 
@@ -310,8 +309,9 @@ float rcbf_open_circuit_voltage_near_V(const rcbf_constants_t *constants, float 
 
 float rcbf_open_circuit_voltage_V(const rcbf_constants_t *constants, float soc)
 {
-    uint8_t segment = 0u;
-    return rcbf_open_circuit_voltage_near_V(constants, soc, &segment);
+    const float clamped = within_table(constants, soc);
+    return ocv_V(constants,
+                 numeric_segment(constants->ocv_soc, constants->ocv_points, clamped), clamped);
 }
 
 #define AT(member) ((uint16_t)offsetof(rcbf_constants_t, member))
