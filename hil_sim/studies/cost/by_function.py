@@ -80,8 +80,8 @@ def _addresses(program: Path, board: str, records: Sequence[bytes]) -> Iterator[
         inputs, trace = Path(folder) / "records", Path(folder) / "trace"
         inputs.write_bytes(b"".join(records))
         arguments = f"arg=cost,arg={inputs},arg={Path(folder) / 'ticks'}"
-        options = ("-singlestep", "-d", "exec,nochain", "-D", str(trace))
-        options += ("-semihosting-config", f"enable=on,target=native,{arguments}")
+        tracing = ("-singlestep", "-d", "exec,nochain", "-D", str(trace))
+        options = (*tracing, "-semihosting-config", f"enable=on,target=native,{arguments}")
         with Emulation(program, board, options=options) as emulation:
             if emulation.wait(TIMEOUT_S) != 0:
                 raise InputError(f"{program}: has not ended well on {board}; build it anew")
