@@ -50,6 +50,8 @@ typedef struct {
     bms_t bms;
     can_frame_t sent;
     state_t state;
+    uint8_t segment; /* of the voltage's table, as a period keeps it */
+    rcbf_steadier_t steadier;
     family_t family; /* before the period's readings */
     family_reading_t reading;
     float result;
@@ -67,6 +69,15 @@ static void estimate(cost_t *cost)
 }
 
 static void decide(cost_t *cost)
+{
+    const rcbf_constants_t *constants = &cost->calibration->rcbf;
+    const rcbf_input_t *input = &cost->state.decision_input;
+    const float voltage_V =
+        rcbf_open_circuit_voltage_near_V(constants, input->soc, &cost->segment);
+    cost->result = rcbf_solve_steadily(constants, input, voltage_V, &cost->steadier).current_A;
+}
+
+static void decide_on_state(cost_t *cost)
 {
     cost->result =
         rcbf_solve(&cost->calibration->rcbf, &cost->state.decision_input).current_A;
@@ -86,7 +97,7 @@ static void decide_for_family(cost_t *cost)
                        .current_A;
 }
 
-static void run_period(cost_t *cost)
+static void whole_period(cost_t *cost)
 {
     for (uint32_t i = 0u; i < cost->record.frames; i++) {
         bms_receive(&cost->bms, &cost->record.content.frames[i]);
@@ -133,7 +144,8 @@ static ticks_t play_period(cost_t *cost)
     ticks_t ticks = { .nothing = ticks_of(cost, do_nothing) };
     const float commanded_A = cost->bms.command_A;
     cost->family = cost->bms.family;
-    ticks.period = ticks_of(cost, run_period);
+    ticks.period = ticks_of(cost, whole_period);
+    cost->segment = cost->bms.ocv_segment;
     take_state(cost);
     cost->reading = reading_of(&cost->bms);
     cost->reading.command_A = commanded_A;
@@ -143,6 +155,7 @@ static ticks_t play_period(cost_t *cost)
         ticks.decision = ticks_of(cost, decide_for_family);
     } else {
         ticks.observation = ticks.nothing;
+        rcbf_steadier_reset(&cost->steadier);
         ticks.decision = ticks_of(cost, decide);
     }
     return ticks;
@@ -155,7 +168,7 @@ static ticks_t play_state(cost_t *cost)
     ticks.observation = ticks.nothing;
     cost->state = cost->record.content.state;
     ticks.estimate = ticks_of(cost, estimate);
-    ticks.decision = ticks_of(cost, decide);
+    ticks.decision = ticks_of(cost, decide_on_state);
     return ticks;
 }
 

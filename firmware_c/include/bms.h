@@ -60,9 +60,11 @@ typedef struct {
     pace_t pace;
     bool has_started; /* all messages were valid once, or had the time to become so */
     bool may_start;   /* the request has been off since start-up or the last charge */
+    uint16_t outside; /* bit n: the reading that fault n is about is implausible or none */
     soc_t soc;
     bool soc_known;
     uint8_t ocv_segment; /* of the table, where the last search ended */
+    uint8_t decision_segment; /* and where that for the decision did */
     float open_circuit_voltage_V; /* of one cell's state of charge, where that is known */
     history_t history;
     thermal_t thermal;

@@ -73,7 +73,8 @@ typedef struct {
     bool is_disturbed; /* a frame of the period was refused */
 } e2e_verdict_t;
 
-/* CRC over bytes 1..length-1 followed by the data id that belongs to the counter. */
+/* CRC over bytes 1..length-1 followed by the data id that belongs to the counter; a length is
+ * E2E_HEADER_LENGTH or more. */
 uint8_t e2e_crc(const uint8_t *data, uint8_t length, const uint8_t data_ids[E2E_COUNTERS]);
 
 /* Writes counter and CRC into a frame whose remaining bits are set. */

@@ -63,6 +63,7 @@ typedef struct {
     bool is_searching;
     uint8_t tried;
     uint8_t trying; /* which of the candidates */
+    uint8_t ocv_segment; /* of the table, where the last search for a voltage ended */
     float age_s;    /* since the search began */
     planner_start_t start;
     planner_goal_t goal;

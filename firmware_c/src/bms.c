@@ -97,12 +97,10 @@ static void update_estimates(bms_t *bms)
     const bms_calibration_t *calibration = bms->calibration;
     const plausibility_t *limits = &calibration->plausibility;
     const bool is_current_usable = is_usable(bms, CAN_RECEIVED_CELL_ELECTRICAL) &&
-                                   !is_outside(m->current_A, &limits->current_A);
+                                   !is_outside(bms, OUTSIDE_CURRENT);
     const bool is_thermal_fresh = is_usable(bms, CAN_RECEIVED_CELL_THERMAL);
-    const bool is_surface_usable =
-        is_thermal_fresh && !is_outside(m->surface_temperature_K, &limits->surface_temperature_K);
-    const bool is_coolant_usable =
-        is_thermal_fresh && !is_outside(m->coolant_temperature_K, &limits->coolant_temperature_K);
+    const bool is_surface_usable = is_thermal_fresh && !is_outside(bms, OUTSIDE_SURFACE);
+    const bool is_coolant_usable = is_thermal_fresh && !is_outside(bms, OUTSIDE_COOLANT);
     /* Without a usable reading the command is what has most likely flowed. */
     const float current_A = is_current_usable ? m->current_A : bms->command_A;
     if (is_coolant_usable) {
@@ -150,6 +148,7 @@ static void follow_request(bms_t *bms, uint32_t symptoms)
     } else if ((bms->state == BMS_STANDBY) && bms->may_start && (symptoms == 0u)) {
         soc_set(&bms->soc, bms->measurement.plug_in_soc);
         look_up_voltage(bms);
+        bms->decision_segment = bms->ocv_segment;
         if (has_family(bms)) {
             const family_reading_t reading = reading_of(bms);
             family_begin(&bms->family, &bms->calibration->family, &bms->calibration->rcbf,
@@ -189,15 +188,16 @@ static void decide(bms_t *bms)
     } else if (is_charging(bms)) {
         const rcbf_input_t input = {
             .soc = bms->soc.soc + calibration->soc_error,
-            .core_temperature_K = { .high_K = bms->estimate.core_temperature_K },
-            .surface_temperature_K = { .high_K = bms->surface_temperature_K },
-            .coolant_temperature_K = { .high_K = m->coolant_temperature_K },
+            .core_temperature_K = { bms->estimate.core_temperature_K, 0.0f },
+            .surface_temperature_K = { bms->surface_temperature_K, 0.0f },
+            .coolant_temperature_K = { m->coolant_temperature_K, 0.0f },
             .cooling_power_W = m->cooling_power_W,
             .reference_current_A = bms_wanted_current_A(bms),
         };
         bms->decision = rcbf_solve_steadily(&calibration->rcbf, &input,
-                                            rcbf_open_circuit_voltage_V(&calibration->rcbf,
-                                                                        input.soc),
+                                            rcbf_open_circuit_voltage_near_V(
+                                                &calibration->rcbf, input.soc,
+                                                &bms->decision_segment),
                                             &bms->steadier);
         bms->state = (bms->decision.active == RCBF_NONE) ? BMS_CHARGING : BMS_DERATED;
     }
@@ -210,6 +210,7 @@ static void run_period(bms_t *bms)
     if (!bms->has_started) {
         return;
     }
+    bms->outside = bms_readings_outside(bms);
     update_estimates(bms);
     uint32_t symptoms = bms_symptoms(bms);
     if (bms->state == BMS_INIT) {

@@ -1,5 +1,7 @@
 #include "bms_plan.h"
 
+#include <math.h>
+
 #include "bms_symptoms.h"
 #include "family_tables.h"
 #include "numeric.h"
@@ -50,10 +52,9 @@ static void describe_family(const bms_t *bms, planner_start_t *start)
         start->soc = family->soc_low.soc;
         return;
     }
-    start->soc = numeric_clamp(
+    start->soc = numeric_larger(
         0.5f * (family->soc_low.soc + family->soc_high.soc),
-        family_soc_at(cell, voltage_V - error_V - greatest_ohm * most_A),
-        family_soc_at(cell, voltage_V + error_V - known->least_resistance_ohm * most_A));
+        family_soc_at(cell, voltage_V - error_V - greatest_ohm * most_A));
     start->soc_per_As =
         0.5f * (known->least_soc_per_A + known->greatest_soc_per_A) / known->period_s;
     start->total_ohm = numeric_clamp(
@@ -94,7 +95,7 @@ static bool is_other_goal(const bms_t *bms)
     if ((planned_s < 0.0f) || (asked_s < 0.0f)) {
         return (planned_s < 0.0f) != (asked_s < 0.0f);
     }
-    return !(numeric_abs(asked_s - (planned_s - bms->planner.age_s)) <= OTHER_TIME_S);
+    return !(fabsf(asked_s - (planned_s - bms->planner.age_s)) <= OTHER_TIME_S);
 }
 
 void bms_plan(bms_t *bms)

@@ -1,5 +1,7 @@
 #include "bms_symptoms.h"
 
+#include <math.h>
+
 #include "numeric.h"
 #include "request.h"
 
@@ -19,6 +21,23 @@ static uint32_t symptoms_of_missing_messages(const bms_t *bms)
     return symptoms;
 }
 
+NUMERIC_APART uint32_t outside_if(float value, const range_t *range, uint32_t fault)
+{
+    return ((value >= range->low) && (value <= range->high)) ? 0u : fault;
+}
+
+uint16_t bms_readings_outside(const bms_t *bms)
+{
+    const codec_measurement_t *m = &bms->measurement;
+    const plausibility_t *limits = &bms->calibration->plausibility;
+    return (uint16_t)(
+        outside_if(m->current_A, &limits->current_A, OUTSIDE_CURRENT) |
+        outside_if(m->voltage_V, &limits->voltage_V, OUTSIDE_VOLTAGE) |
+        outside_if(m->surface_temperature_K, &limits->surface_temperature_K, OUTSIDE_SURFACE) |
+        outside_if(m->coolant_temperature_K, &limits->coolant_temperature_K, OUTSIDE_COOLANT) |
+        outside_if(m->cooling_power_W, &limits->cooling_power_W, OUTSIDE_COOLING));
+}
+
 static bool current_deviates(const bms_t *bms)
 {
     const bms_calibration_t *calibration = bms->calibration;
@@ -28,7 +47,7 @@ static bool current_deviates(const bms_t *bms)
         return !family_supply_is_plausible(&bms->family, &calibration->family, current_A,
                                            deviation_A);
     }
-    return numeric_abs(current_A - bms->command_A) > deviation_A;
+    return fabsf(current_A - bms->command_A) > deviation_A;
 }
 
 static bool voltage_deviates(const bms_t *bms)
@@ -44,7 +63,7 @@ static bool voltage_deviates(const bms_t *bms)
     }
     const float model_V =
         bms->open_circuit_voltage_V - m->current_A * cell->ohmic_resistance_ohm;
-    return numeric_abs(m->voltage_V - model_V) > deviation_V;
+    return fabsf(m->voltage_V - model_V) > deviation_V;
 }
 
 static bool core_is_too_hot(const bms_t *bms)
@@ -83,16 +102,11 @@ static uint32_t symptoms_of_readings(const bms_t *bms)
     const float coldest_surface_K =
         thermal_coldest_surface_K(&bms->thermal, &bms->calibration->thermal);
 
-    return bit_if(electrical && is_outside(m->current_A, &limits->current_A),
-                  FAULT_CURRENT_RANGE) |
-           bit_if(electrical && is_outside(m->voltage_V, &limits->voltage_V),
-                  FAULT_VOLTAGE_RANGE) |
-           bit_if(thermal && is_outside(m->surface_temperature_K, &limits->surface_temperature_K),
-                  FAULT_SURFACE_RANGE) |
-           bit_if(thermal && is_outside(m->coolant_temperature_K, &limits->coolant_temperature_K),
-                  FAULT_COOLANT_RANGE) |
-           bit_if(coolant && is_outside(m->cooling_power_W, &limits->cooling_power_W),
-                  FAULT_COOLING_RANGE) |
+    const uint32_t told = (electrical ? (OUTSIDE_CURRENT | OUTSIDE_VOLTAGE) : 0u) |
+                          (thermal ? (OUTSIDE_SURFACE | OUTSIDE_COOLANT) : 0u) |
+                          (coolant ? OUTSIDE_COOLING : 0u);
+
+    return (bms->outside & told) |
            bit_if(is_usable(bms, CAN_RECEIVED_CHARGE_REQUEST) &&
                       !request_is_valid(m, is_valid(bms, CAN_RECEIVED_CHARGE_MODE),
                                         cell->max_soc),

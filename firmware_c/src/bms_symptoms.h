@@ -12,10 +12,17 @@ static inline uint32_t bit_if(bool condition, fault_t fault)
     return condition ? ((uint32_t)1u << (uint32_t)fault) : 0u;
 }
 
-static inline bool is_outside(float value, const range_t *range)
+/* Of the latest readings, whether any of those that these faults are about is outside its range. */
+static inline bool is_outside(const bms_t *bms, uint32_t faults)
 {
-    return !((value >= range->low) && (value <= range->high));
+    return (bms->outside & faults) != 0u;
 }
+
+#define OUTSIDE_CURRENT ((uint32_t)1u << (uint32_t)FAULT_CURRENT_RANGE)
+#define OUTSIDE_VOLTAGE ((uint32_t)1u << (uint32_t)FAULT_VOLTAGE_RANGE)
+#define OUTSIDE_SURFACE ((uint32_t)1u << (uint32_t)FAULT_SURFACE_RANGE)
+#define OUTSIDE_COOLANT ((uint32_t)1u << (uint32_t)FAULT_COOLANT_RANGE)
+#define OUTSIDE_COOLING ((uint32_t)1u << (uint32_t)FAULT_COOLING_RANGE)
 
 static inline bool is_charging(const bms_t *bms)
 {
@@ -42,7 +49,6 @@ static inline bool has_family(const bms_t *bms)
 static inline family_reading_t reading_of(const bms_t *bms)
 {
     const codec_measurement_t *m = &bms->measurement;
-    const plausibility_t *limits = &bms->calibration->plausibility;
     return (family_reading_t){
         .current_A = m->current_A,
         .voltage_V = m->voltage_V,
@@ -52,13 +58,14 @@ static inline family_reading_t reading_of(const bms_t *bms)
         .command_A = bms->command_A,
         .is_usable = is_usable(bms, CAN_RECEIVED_CELL_ELECTRICAL) &&
                      is_usable(bms, CAN_RECEIVED_CELL_THERMAL) &&
-                     !is_outside(m->current_A, &limits->current_A) &&
-                     !is_outside(m->voltage_V, &limits->voltage_V) &&
-                     !is_outside(m->surface_temperature_K, &limits->surface_temperature_K) &&
-                     !is_outside(m->coolant_temperature_K, &limits->coolant_temperature_K),
+                     !is_outside(bms, OUTSIDE_CURRENT | OUTSIDE_VOLTAGE | OUTSIDE_SURFACE |
+                                          OUTSIDE_COOLANT),
         .is_charging = is_charging(bms),
     };
 }
+
+/* What bms_t.outside says of the latest readings. */
+uint16_t bms_readings_outside(const bms_t *bms);
 
 /* Bit n for fault n, of what this period's messages lack and of what their readings say. */
 uint32_t bms_symptoms(const bms_t *bms);

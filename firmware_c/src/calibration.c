@@ -10,15 +10,9 @@
 #define HIGHEST_OCV_V 4.6f
 #define LARGEST_READING_ERROR 100.0f
 
-typedef struct {
-    uint16_t place; /* of a float in bms_calibration_t */
-    float low;
-    float high;
-} envelope_t;
+#define WITHIN(member, low, high) { (uint16_t)offsetof(bms_calibration_t, member), 1u, low, high }
 
-#define WITHIN(member, low, high) { (uint16_t)offsetof(bms_calibration_t, member), low, high }
-
-static const envelope_t ENVELOPE[] = {
+static const numeric_field_t ENVELOPE[] = {
     WITHIN(sampling_period_s, 0.001f, 10.0f),
     WITHIN(reference_current_A, -3000.0f, -0.001f),
     WITHIN(current_growth_A, 1e-6f, 3000.0f),
@@ -43,35 +37,24 @@ static const envelope_t ENVELOPE[] = {
     WITHIN(plausibility.voltage_overshoot_V, 1e-6f, 0.3f),
     WITHIN(plausibility.temperature_overshoot_K, 1e-6f, 10.0f),
     WITHIN(plausibility.surface_deficit_K, 1e-6f, 30.0f),
+    WITHIN(plausibility.cooling_power_W.low, -FLT_MAX, FLT_MAX),
+    WITHIN(plausibility.cooling_power_W.high, -FLT_MAX, FLT_MAX),
+    { (uint16_t)offsetof(bms_calibration_t, plausibility.reading_error), KAN_MEASURED_INPUTS, 0.0f,
+      LARGEST_READING_ERROR },
 };
 
+/* Both are numbers. */
 static bool range_is_valid(const range_t *range)
 {
-    return numeric_is_finite(range->low) && numeric_is_finite(range->high) &&
-           (range->low < range->high);
+    return range->low < range->high;
 }
 
-static bool plausibility_is_valid(const plausibility_t *limits)
+static bool ranges_are_valid(const plausibility_t *limits)
 {
-    bool valid = range_is_valid(&limits->current_A) && range_is_valid(&limits->voltage_V) &&
-                 range_is_valid(&limits->surface_temperature_K) &&
-                 range_is_valid(&limits->coolant_temperature_K) &&
-                 range_is_valid(&limits->cooling_power_W);
-    for (uint32_t i = 0u; i < KAN_MEASURED_INPUTS; i++) {
-        valid = valid && numeric_is_within(limits->reading_error[i], 0.0f, LARGEST_READING_ERROR);
-    }
-    return valid;
-}
-
-static bool is_in_envelope(const bms_calibration_t *calibration)
-{
-    bool inside = true;
-    for (uint32_t i = 0u; i < NUMERIC_COUNT(ENVELOPE); i++) {
-        const envelope_t *row = &ENVELOPE[i];
-        inside = inside &&
-                 numeric_members_are_within(calibration, &row->place, 1u, row->low, row->high);
-    }
-    return inside;
+    return range_is_valid(&limits->current_A) && range_is_valid(&limits->voltage_V) &&
+           range_is_valid(&limits->surface_temperature_K) &&
+           range_is_valid(&limits->coolant_temperature_K) &&
+           range_is_valid(&limits->cooling_power_W);
 }
 
 /* For a table whose points rise. */
@@ -84,10 +67,10 @@ static bool ocv_is_in_envelope(const rcbf_constants_t *cell)
 bool calibration_is_valid(const bms_calibration_t *calibration)
 {
     return (calibration->layout == BMS_CALIBRATION_LAYOUT) &&
-           is_in_envelope(calibration) &&
+           numeric_fields_are_within(calibration, ENVELOPE, NUMERIC_COUNT(ENVELOPE)) &&
            rcbf_constants_are_valid(&calibration->rcbf) &&
            ocv_is_in_envelope(&calibration->rcbf) &&
-           plausibility_is_valid(&calibration->plausibility) &&
+           ranges_are_valid(&calibration->plausibility) &&
            thermal_constants_are_valid(&calibration->thermal) &&
            family_constants_are_valid(&calibration->family) &&
            planner_constants_are_valid(&calibration->planner) &&

@@ -30,8 +30,8 @@ uint32_t codec_encode(const codec_signal_t *signal, float value, codec_rounding_
     const float up = (rounding == CODEC_TOWARDS_ZERO) ? STEP_TOLERANCE : 0.5f;
     /* Rounded before the offset comes on top, in which float32 would lose parts of a step. */
     const int32_t steps =
-        (int32_t)numeric_smaller(numeric_abs(value) / signal->scale + up, MOST_STEPS);
-    const int32_t raw = ((value < 0.0f) ? -steps : steps) - signal->offset_steps;
+        (int32_t)numeric_smaller(fabsf(value) / signal->scale + up, MOST_STEPS);
+    const int32_t raw = (numeric_is_negative(value) ? -steps : steps) - signal->offset_steps;
     if (raw < 0) {
         return 0u;
     }

@@ -35,10 +35,12 @@ static const uint8_t CRC8_OF_BYTE[256] = {
 uint8_t e2e_crc(const uint8_t *data, uint8_t length, const uint8_t data_ids[E2E_COUNTERS])
 {
     uint32_t crc = CRC8_START;
+    const uint8_t *byte = &data[1];
     const uint8_t *const end = &data[length];
-    for (const uint8_t *byte = &data[1]; byte < end; byte++) {
+    do {
         crc = CRC8_OF_BYTE[crc ^ *byte];
-    }
+        byte++;
+    } while (byte < end);
     crc = CRC8_OF_BYTE[crc ^ data_ids[data[1] & COUNTER_MASK]];
     return (uint8_t)(crc ^ CRC8_FINAL_XOR);
 }
@@ -130,8 +132,19 @@ NUMERIC_INLINE uint32_t periods_in(uint32_t history)
     return (fours + (fours >> 4u)) & 0x0Fu;
 }
 
+/* Whether a valid message has a window of good periods and none that is bad, as it mostly has. */
+NUMERIC_INLINE bool is_undisturbed(const e2e_receiver_t *receiver, const e2e_policy_t *policy)
+{
+    return (receiver->state == E2E_VALID) && (receiver->bad_periods == 0u) &&
+           (receiver->good_periods == with_period(UINT8_MAX, true, policy->window_periods)) &&
+           (policy->valid.min_good <= policy->window_periods);
+}
+
 static e2e_state_t next_state(const e2e_receiver_t *receiver, const e2e_policy_t *policy)
 {
+    if (is_undisturbed(receiver, policy)) {
+        return E2E_VALID;
+    }
     const uint32_t good = periods_in(receiver->good_periods);
     const uint32_t bad = periods_in(receiver->bad_periods);
     switch (receiver->state) {

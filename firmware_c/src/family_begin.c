@@ -1,11 +1,13 @@
 #include "family.h"
 
+#include <math.h>
+
 #include "family_tables.h"
 #include "numeric.h"
 
 bool family_is_at_rest(const family_constants_t *constants, const family_reading_t *reading)
 {
-    return numeric_abs(reading->current_A) <= 2.0f * constants->current_error_A;
+    return fabsf(reading->current_A) <= 2.0f * constants->current_error_A;
 }
 
 void family_begin(family_t *family, const family_constants_t *constants,

@@ -250,19 +250,23 @@ kan_estimate_t kan_evaluate(const kan_model_t *model, const float *inputs)
     const uint32_t cells = model->cells;
     edge_walk_t walk = { &model->tables[cells - 1u], &model->tables[last_coefficients(cells)],
                          cells, edge_numbers(cells) };
-    const uint32_t *width = &model->width[1];
-    const bool is_spanned = model->spans_reach != 0u;
-    for (uint32_t to = 0u; to < *width; to++) {
-        sums[to] = sum_of_edges(&walk, nodes, end, is_spanned, &in_domain);
-    }
-    for (const uint32_t *last = &model->width[model->layers]; width < last; width++) {
+    const uint32_t *width = model->width;
+    const uint32_t *const last = &model->width[model->layers];
+    bool is_spanned = model->spans_reach != 0u;
+    do {
+        const float *const layer_end = &nodes[*width];
+        float *sum = sums;
+        float *const sums_end = &sums[width[1]];
+        do {
+            *sum = sum_of_edges(&walk, nodes, layer_end, is_spanned, &in_domain);
+            sum++;
+        } while (sum < sums_end);
         float *const spent = nodes;
         nodes = sums;
         sums = spent;
-        for (uint32_t to = 0u; to < width[1]; to++) {
-            sums[to] = sum_of_edges(&walk, nodes, &nodes[*width], false, &in_domain);
-        }
-    }
-    return (kan_estimate_t){ model->output_center_K + model->output_half_range_K * sums[0],
+        is_spanned = false;
+        width++;
+    } while (width < last);
+    return (kan_estimate_t){ model->output_center_K + model->output_half_range_K * nodes[0],
                              in_domain };
 }

@@ -13,6 +13,13 @@
 #define NUMERIC_INLINE static inline
 #endif
 
+/* Where many call what is not small. */
+#if defined(__GNUC__) && defined(__arm__)
+#define NUMERIC_APART __attribute__((noinline, unused)) static
+#else
+#define NUMERIC_APART static inline
+#endif
+
 #define NUMERIC_INFINITY_BITS 0x7F800000u
 /* Least number above 0 that float32 has. */
 #define NUMERIC_LEAST 0x1p-149f
@@ -33,6 +40,12 @@ static inline bool numeric_is_finite(float value)
     return (numeric_bits(value) << 1u) < (NUMERIC_INFINITY_BITS << 1u);
 }
 
+/* By the sign, which -0 and NaN have too. */
+NUMERIC_INLINE bool numeric_is_negative(float value)
+{
+    return (numeric_bits(value) >> 31u) != 0u;
+}
+
 NUMERIC_INLINE float numeric_larger(float a, float b)
 {
     return (a > b) ? a : b;
@@ -44,7 +57,7 @@ NUMERIC_INLINE float numeric_smaller(float a, float b)
 }
 
 /* False for NaN. */
-static inline bool numeric_is_within(float value, float low, float high)
+NUMERIC_APART bool numeric_is_within(float value, float low, float high)
 {
     return (value >= low) && (value <= high);
 }
@@ -74,11 +87,6 @@ NUMERIC_INLINE uint32_t numeric_segment(const float *axis, uint32_t points, floa
     return (uint32_t)(start - axis);
 }
 
-static inline float numeric_abs(float value)
-{
-    return (value < 0.0f) ? -value : value;
-}
-
 static inline bool numeric_all_finite(const float *values, uint32_t count)
 {
     bool finite = true;
@@ -96,6 +104,28 @@ static inline bool numeric_members_are_within(const void *structure, const uint1
     for (uint32_t i = 0u; i < count; i++) {
         const void *member = (const uint8_t *)structure + offsets[i];
         within = within && numeric_is_within(*(const float *)member, low, high);
+    }
+    return within;
+}
+
+/* Consecutive members of a structure, all of them float, and what they must be within. */
+typedef struct {
+    uint16_t place;
+    uint16_t count;
+    float low;
+    float high;
+} numeric_field_t;
+
+/* For NaN in any member, too, false. */
+static inline bool numeric_fields_are_within(const void *structure, const numeric_field_t *field,
+                                             uint32_t fields)
+{
+    bool within = true;
+    for (const numeric_field_t *const end = &field[fields]; field < end; field++) {
+        const float *member = (const float *)(const void *)((const uint8_t *)structure + field->place);
+        for (uint32_t i = 0u; i < field->count; i++) {
+            within = within && numeric_is_within(member[i], field->low, field->high);
+        }
     }
     return within;
 }

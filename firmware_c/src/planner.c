@@ -1,6 +1,7 @@
 #include "planner.h"
 
 #include <math.h>
+#include <stddef.h>
 
 #include "family_tables.h"
 #include "numeric.h"
@@ -27,11 +28,15 @@ enum { CORE, SURFACE, COOLANT, HEAT, COOLING };
 
 bool planner_constants_are_valid(const planner_constants_t *constants)
 {
-    return (constants->period_s > 0.0f) && (constants->step_s >= constants->period_s) &&
-           (constants->step_s <= FLT_MAX) && (constants->growth_A > 0.0f) &&
-           (constants->growth_A <= FLT_MAX) && (constants->completion_soc > 0.0f) &&
-           (constants->completion_soc <= FLT_MAX) &&
-           numeric_all_finite(constants->response, PLANNER_MASSES * PLANNER_DRIVES);
+    static const numeric_field_t FIELDS[] = {
+        { (uint16_t)offsetof(planner_constants_t, period_s),
+          (uint16_t)(offsetof(planner_constants_t, response) / sizeof(float)), NUMERIC_LEAST,
+          FLT_MAX },
+        { (uint16_t)offsetof(planner_constants_t, response), PLANNER_MASSES * PLANNER_DRIVES,
+          -FLT_MAX, FLT_MAX },
+    };
+    return numeric_fields_are_within(constants, FIELDS, NUMERIC_COUNT(FIELDS)) &&
+           (constants->step_s >= constants->period_s);
 }
 
 void planner_reset(planner_t *planner)
@@ -74,14 +79,14 @@ static float cell_limit_A(const planner_t *planner, const rcbf_constants_t *k, f
     const float core_A =
         curved_A(k->a1_per_s * core_above_surface_K - k->alpha2_per_s * above_K[CORE] -
                    k->core_uncertainty_K_per_s - k->core_margin_K_per_s -
-                   numeric_abs(k->a1_per_s - k->alpha2_per_s) * e_K,
+                   fabsf(k->a1_per_s - k->alpha2_per_s) * e_K,
                k->a2_per_As * core_K, k->a3_K_per_A2s);
     const float surface_A =
         curved_A(k->a4_per_s2 * core_above_surface_K +
                    k->a6_per_s2 * (above_K[COOLANT] - above_K[SURFACE]) +
                    k->alpha3_per_s2 * surface_room_K +
                    k->a10_K_per_Ws2 * planner->start.cooling_power_W - k->delta4_K_per_s2 -
-                   k->surface_margin_K_per_s2 - numeric_abs(k->a4_per_s2) * e_K,
+                   k->surface_margin_K_per_s2 - fabsf(k->a4_per_s2) * e_K,
                k->a8_per_As2 * core_K, -k->a9_K_per_A2s2);
     return numeric_smaller(soc_A, numeric_smaller(core_A, surface_A));
 }
@@ -122,7 +127,7 @@ static float next_strength_A(planner_t *planner, const planner_constants_t *cons
     const float middle_soc =
         planner->soc + 0.5f * constants->step_s * planner->strength_A * planner->start.soc_per_As;
     const float room_V = cell->max_voltage_V - cell->voltage_margin_V -
-                         rcbf_open_circuit_voltage_V(cell, middle_soc);
+                         rcbf_open_circuit_voltage_near_V(cell, middle_soc, &planner->ocv_segment);
     const float voltage_A = room_V / (left * planner->start.total_ohm);
     const float limit_A = (family->is_stated != 0u) ? family_limit_A(planner, cell, family)
                                                     : cell_limit_A(planner, cell, constants->step_s);
@@ -171,26 +176,27 @@ static void begin_inner(planner_t *planner, uint8_t which)
                      (which == 0u) ? (planner->high_A - part_A) : (planner->low_A + part_A));
 }
 
-/* A sum is finite only where all parts are. */
-static bool is_known(const planner_start_t *start, const planner_goal_t *goal)
+static bool is_known(const planner_t *planner)
 {
-    return numeric_is_finite(start->temperature_K[CORE] + start->temperature_K[SURFACE] +
-                             start->temperature_K[COOLANT] + start->soc + start->strength_A +
-                             start->cooling_power_W + start->resistance_ohm + start->total_ohm +
-                             start->entropic_V + start->soc_per_As + goal->strongest_A +
-                             goal->time_left_s) &&
-           (start->resistance_ohm > 0.0f) && (goal->strongest_A > 0.0f);
+    static const numeric_field_t FIELDS[] = {
+        { (uint16_t)offsetof(planner_t, start),
+          (uint16_t)((sizeof(planner_start_t) + sizeof(planner_goal_t)) / sizeof(float)), -FLT_MAX,
+          FLT_MAX },
+    };
+    return numeric_fields_are_within(planner, FIELDS, NUMERIC_COUNT(FIELDS)) &&
+           (planner->start.resistance_ohm > 0.0f) && (planner->goal.strongest_A > 0.0f);
 }
 
 void planner_begin(planner_t *planner)
 {
-    if (!is_known(&planner->start, &planner->goal)) {
+    if (!is_known(planner)) {
         planner_reset(planner);
         return;
     }
     planner->is_searching = true;
     planner->age_s = 0.0f;
     planner->tried = 0u;
+    planner->ocv_segment = 0u;
     planner->best.cost = FLT_MAX;
     const float planned_A = planner->planned_A;
     const float strongest_A = planner->goal.strongest_A;

@@ -291,22 +291,27 @@ NUMERIC_INLINE float within_table(const rcbf_constants_t *constants, float soc)
                          constants->ocv_soc[constants->ocv_points - 1u]);
 }
 
+float rcbf_open_circuit_voltage_near_V(const rcbf_constants_t *constants, float soc,
+                                       uint8_t *segment)
+{
+    const float clamped = within_table(constants, soc);
+    uint32_t at = *segment;
+    if (clamped > constants->ocv_soc[at + 1u]) {
+        at++; /* there is one, since the last point is not below what is clamped to it */
+    }
+    const float *start = &constants->ocv_soc[at];
+    if (!((clamped > start[0]) && (clamped <= start[1]))) {
+        at = numeric_segment(constants->ocv_soc, constants->ocv_points, clamped);
+    }
+    *segment = (uint8_t)at;
+    return ocv_V(constants, at, clamped);
+}
+
 float rcbf_open_circuit_voltage_V(const rcbf_constants_t *constants, float soc)
 {
     const float clamped = within_table(constants, soc);
     return ocv_V(constants,
                  numeric_segment(constants->ocv_soc, constants->ocv_points, clamped), clamped);
-}
-
-float rcbf_open_circuit_voltage_near_V(const rcbf_constants_t *constants, float soc,
-                                       uint8_t *segment)
-{
-    const float clamped = within_table(constants, soc);
-    const float *start = &constants->ocv_soc[*segment];
-    if (!((clamped > start[0]) && (clamped <= start[1]))) {
-        *segment = (uint8_t)numeric_segment(constants->ocv_soc, constants->ocv_points, clamped);
-    }
-    return ocv_V(constants, *segment, clamped);
 }
 
 #define AT(member) ((uint16_t)offsetof(rcbf_constants_t, member))

@@ -1,15 +1,20 @@
 #include "thermal.h"
 
+#include <stddef.h>
+
 #include "numeric.h"
+
+/* From the first of them to the bound on the error. */
+#define NUMBERS \
+    ((uint16_t)(offsetof(thermal_constants_t, error_bound_K) / sizeof(float)))
 
 bool thermal_constants_are_valid(const thermal_constants_t *constants)
 {
-    return numeric_all_finite(constants->transition, 4u) &&
-           numeric_all_finite(constants->gain_K_per_W, 2u) &&
-           numeric_all_finite(constants->gain_coolant, 2u) &&
-           numeric_is_finite(constants->ohmic_resistance_ohm) &&
-           numeric_is_finite(constants->entropic_coefficient_V_per_K) &&
-           numeric_is_finite(constants->error_bound_K) && (constants->error_bound_K >= 0.0f);
+    static const numeric_field_t FIELDS[] = {
+        { (uint16_t)offsetof(thermal_constants_t, transition), NUMBERS, -FLT_MAX, FLT_MAX },
+        { (uint16_t)offsetof(thermal_constants_t, error_bound_K), 1u, 0.0f, FLT_MAX },
+    };
+    return numeric_fields_are_within(constants, FIELDS, NUMERIC_COUNT(FIELDS));
 }
 
 void thermal_reset(thermal_t *thermal)

@@ -93,7 +93,7 @@ MUTANTS = [
     Mutant("commands are rounded towards zero", "codec.c", "(rounding == CODEC_TOWARDS_ZERO) ? STEP_TOLERANCE : 0.5f", "0.5f", "tests/firmware/test_codec.py", "towards_zero"),
     Mutant("a plan only weakens", "planner.c", "((planned_A > reference_A) && (planned_A <= 0.0f))", "(planned_A <= 0.0f)", PLANNED, "never_more"),
     Mutant("a plan asks for no discharge", "planner.c", " && (planned_A <= 0.0f))", ")", PLANNED, "never_more"),
-    Mutant("a plan needs numbers", "planner.c", "if (!is_known(&planner->start, &planner->goal))", "if (planner->goal.strongest_A < 0.0f)", PLANNED, "no_number"),
+    Mutant("a plan needs numbers", "planner.c", "if (!is_known(planner))", "if (planner->goal.strongest_A < 0.0f)", PLANNED, "no_number"),
     Mutant("a period's steps are bounded", "planner.c", " && (i < PLANNER_STEPS); i++", "; i++", PLANNED, "takes_no_more"),
     Mutant("the better half is searched on", "planner.c", "inner[0].cost < inner[1].cost", "inner[0].cost > inner[1].cost", PLANNED, "near_the_bound"),
     Mutant("limits are ridden in the prediction", "planner.c", "numeric_smaller(soc_A, numeric_smaller(core_A, surface_A))", "soc_A", PLANNED, "comes_true"),

@@ -20,6 +20,7 @@ from bms.presets import load_preset
 from hil_sim.bus.buses import Frame
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import Settings
+from hil_sim.studies.cost.by_function import instructions_by_function
 from hil_sim.studies.cost.charges import charge_records
 from hil_sim.studies.cost.counting import count
 from hil_sim.studies.cost.measure import CostReport, measure_cost
@@ -105,6 +106,17 @@ def test_estimate_and_decision_stay_within_the_budget_everywhere_the_search_goes
     preset = load_preset("paper_calibrated")
     charge_s = np.count_nonzero(report.charging) * preset.timing.sampling_period_s
     assert charge_s == pytest.approx(run_both(Settings(preset)).summary.charge_time_s, abs=1.0)
+
+
+def test_functions_of_a_period_add_up_to_what_is_counted_of_it(program, report):
+    records = charge_records(Settings(load_preset("paper_calibrated"), max_time_s=2.0)).records
+    found = instructions_by_function(program, FPU, records, 5)
+    # The call itself is not counted.
+    assert sum(found.values()) == pytest.approx(
+        count(program, FPU, records).period[-5:].mean(), abs=10.0
+    )
+    assert found["kan_evaluate"] <= report.costs["estimate"].charge_worst
+    assert list(found.values()) == sorted(found.values(), reverse=True)
 
 
 def test_figures_of_a_charge_are_those_of_its_first_decision_to_its_last(report):

@@ -16,9 +16,11 @@ CFLAGS := -std=c99 -Os -mthumb $(CPU) $(WARNINGS) $(NUMERICS) $(REPRODUCIBLE) \
   $(SECTIONS) -MMD \
   -DPORT_TARGET=$(TARGET_ID)u \
   -I$F/include -I$F/src -I$F/generated -I$F/image -I$F/boot -I$F/port -I$F/port/cortex_m
+# Of what GCC does to be faster, these make code for these processors longer.
+SHORT := -fno-if-conversion -fno-schedule-insns2
 # The core is optimised as a whole; not with its calibration, which can be replaced, and not with
 # the port around it. What is called once stays a function, so that each module has its size.
-WHOLE := -flto -ffat-lto-objects -fno-inline-functions-called-once
+WHOLE := $(SHORT) -flto -ffat-lto-objects -fno-inline-functions-called-once
 LINK_WHOLE := $(CFLAGS) -flto -flto-partition=one
 # Where the processor has no square root: the C library's own, without the wrapper that sets errno.
 LDFLAGS := $(CPU) -mthumb -nostartfiles --specs=nano.specs -L$F/linker \
