@@ -19,7 +19,7 @@ from hil_sim.run.session import run_both
 from hil_sim.run.settings import Settings
 
 _COOLER_K = 3.0
-_LONGEST_WAIT_PERIODS = 100
+_LONGEST_WAIT_PERIODS = 600
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,19 @@ def _wait_periods(
     preset: Preset, model: KanModel, initial: Initial, onset: int, seed: int
 ) -> int | None:
     """Periods by which the fault has to come later to find a current; None where none flows."""
-    periods = onset + _LONGEST_WAIT_PERIODS
+    before = max(onset, 1) - 1
+    if _flowing(preset, model, initial, seed, onset + 1)[before]:
+        return 0
+    flowing = _flowing(preset, model, initial, seed, onset + _LONGEST_WAIT_PERIODS)
+    wait = flowing.index(True) if True in flowing else len(flowing)
+    before += wait
+    return wait if before < len(flowing) and flowing[before] else None
+
+
+def _flowing(
+    preset: Preset, model: KanModel, initial: Initial, seed: int, periods: int
+) -> list[bool]:
+    """Whether a current flows, by period of a charge without a fault."""
     settings = Settings(
         preset=preset,
         initial=initial,
@@ -87,14 +99,8 @@ def _wait_periods(
         ends_early=False,
     )
     series = run_both(settings).series
-    flowing = [
+    return [
         current_A < 0.0
         for period, current_A in zip(series.charge_period, series.current_A)
         if period is not None
     ]
-    before = max(onset, 1) - 1
-    if flowing[before]:
-        return 0
-    wait = flowing.index(True) if True in flowing else len(flowing)
-    before += wait
-    return wait if before < len(flowing) and flowing[before] else None

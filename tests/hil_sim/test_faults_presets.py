@@ -107,12 +107,12 @@ def test_start_follows_the_preset(start, temperature_K, onset):
 
 
 def test_a_row_begins_where_and_when_its_charge_has_a_current():
-    """Six kelvin below its limit this family gives none, and its core is unknown at first."""
-    warm = named("surface sensor sticks").start
-    found = place_of(SMALL, warm)
+    """A kelvin below its limit this family gives none, and its core is unknown at first."""
+    near = replace(named("surface sensor sticks").start, below_limit_K=1.0)
+    found = place_of(SMALL, near)
     limit_K = SMALL.preset.limits.max_surface_temperature_K
-    assert found.initial.temperature_K == pytest.approx(limit_K - warm.below_limit_K - 3.0)
-    assert found.onset == warm.onset_period
+    assert found.initial.temperature_K == pytest.approx(limit_K - 4.0)
+    assert found.onset == near.onset_period
     growing = named("current sensor sticks").start
     assert place_of(SMALL, growing).onset > nominal_onset(SMALL.preset, growing)
     assert play(SMALL, named("sensor sticks: cooling_power_W")).failures == ()
