@@ -15,6 +15,7 @@ import numpy as np
 
 from bms.arrays import Array
 from bms.barrier.rates import Interval, Weights, largest_rate
+from bms.barrier.readings import reading_errors
 from bms.bus_signals import BUS, BusQuantisation
 from bms.cell import CellInterval, CellParameters
 from bms.errors import InputError
@@ -22,8 +23,10 @@ from bms.presets.schema import Preset
 
 SOC_CELLS = 32
 TEMPERATURES = 12
-LONGEST_REST_S = 2.0
-"""Time at rest after which the surface has told the core temperature."""
+SHORTEST_REST_S = 2.0
+"""Time at rest, at least, after which the surface has told the core temperature."""
+_TOLD_WITHIN_K = 2.0
+"""By how much two readings of the surface, at the ends of that time, may mistell the core."""
 CHARGE_WINDOW_S = 10.0
 """Time in a charge over which the surface tells how hot the core is at least."""
 FULL_PERIODS = 10
@@ -219,6 +222,18 @@ def surface_rise_K_per_s(preset: Preset) -> float:
         float(largest_rate(corner, preset, surface, heat_W))
         for corner in corner_cells(cell, interval)
     )
+
+
+def rest_s(preset: Preset) -> float:
+    """Time at rest in s after which the surface tells the core; long where the surface is slow.
+
+    The core is above the surface by Rc Cs times the slope of the surface, which two readings tell
+    the better the further they are apart.
+    """
+    ends = extremes(preset.cell, family_of(preset))
+    slowness_s = ends.core_resistance[1] * ends.surface_heat_capacity[1]
+    error_K = reading_errors(preset).surface_K
+    return max(SHORTEST_REST_S, 2.0 * slowness_s * error_K / _TOLD_WITHIN_K)
 
 
 def hold_s(preset: Preset) -> float:

@@ -123,7 +123,7 @@ def _rest(preset: Preset) -> dict[str, Any]:
     ends = bounds.extremes(preset.cell, bounds.family_of(preset))
     errors, noise = reading_errors(preset), preset.uncertainty
     period_s = preset.timing.sampling_period_s
-    periods = max(2, round(bounds.LONGEST_REST_S / period_s))
+    periods = max(2, round(bounds.rest_s(preset) / period_s))
     window_s = (periods - 1) * period_s
     slowness_s = ends.core_resistance[1] * ends.surface_heat_capacity[1]
     per_gap = ends.core_resistance[1] / ends.surface_resistance[0]

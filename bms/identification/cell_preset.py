@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bms.arrays import Array
+from bms.bus_signals import RANGES
 from bms.cell import CellInterval, CellParameters, OpenCircuitVoltage
 from bms.cell.tables import EntropyTable, ResistanceTable
 from bms.identification.cell_identification import IdentifiedCell
@@ -33,6 +34,7 @@ from bms.presets.schema import (
 _SOC_ERROR = 0.05
 _TOLERANCE, _LAG_S = 0.05, 1.0
 _BOX_ABOVE_K, _BOX_BELOW_K, _COOLANT_BELOW_K = 3.0, 0.5, 10.0
+_MOST_COOLING_W = math.floor(0.9 * RANGES.cooling_power_W[1])
 _OCV_SLOPE_BEYOND_V = 2.0
 """At least, where a slow recording ends flat below the voltage limit."""
 
@@ -276,7 +278,8 @@ def _initial(
         "initial.cooling_power_W": "chosen: half of the heat at the strongest current",
     }
     room_K = min(max(298.15, rated.coldest_K + 5.0), rated.warmest_K - 5.0)
-    return Initial(0.1, round(room_K, 2), _figures(0.5 * _heat_W(cell, limits), 2))
+    half_W = min(_figures(0.5 * _heat_W(cell, limits), 2), 0.5 * _MOST_COOLING_W)
+    return Initial(0.1, round(room_K, 2), half_W)
 
 
 def _box(
@@ -284,7 +287,8 @@ def _box(
 ) -> OperatingBox:
     notes |= {
         "operating_box.current_A": "the strongest current with the charger's tolerance",
-        "operating_box.cooling_power_W": "up to twice the heat at the strongest current",
+        "operating_box.cooling_power_W": "up to twice the heat at the strongest current, at "
+        "most what the CAN bus carries",
         "operating_box.surface_temperature_K": "range of charging, and 3 K beyond",
         "operating_box.coolant_temperature_K": "the surface's, and 10 K colder",
     }
@@ -293,7 +297,7 @@ def _box(
     top_K = max(rated.warmest_K, rated.max_core_K) + _BOX_ABOVE_K
     return OperatingBox(
         (-_figures(1.09 * strongest_A), _figures(0.02 * strongest_A, 2)),
-        (-_figures(0.05 * power_W, 2), _figures(2.0 * power_W, 2)),
+        (-_figures(0.05 * power_W, 2), min(_figures(2.0 * power_W, 2), _MOST_COOLING_W)),
         (round(rated.coldest_K - _BOX_BELOW_K, 2), round(top_K, 2)),
         (round(rated.coldest_K - _COOLANT_BELOW_K, 2), round(top_K, 2)),
     )

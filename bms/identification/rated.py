@@ -126,6 +126,8 @@ def _sustained_charge_A(recording: CyclerRecording) -> float:
 
 
 def _floor(value: float) -> float:
-    """Three significant figures, rounded down."""
+    """Three significant figures, rounded down; 0 of 0."""
+    if value <= 0.0:
+        return 0.0
     digits = 2 - math.floor(math.log10(value))
     return float(math.floor(value * 10.0**digits) / 10.0**digits)

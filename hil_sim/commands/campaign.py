@@ -32,7 +32,7 @@ from hil_sim.studies.campaign.histogram import save_histograms
 from hil_sim.studies.campaign.nominal import NominalPart
 from hil_sim.studies.campaign.real_summary import family_is_safe, summarise_family
 from hil_sim.studies.campaign.run import run_campaign
-from hil_sim.studies.campaign.settings import MAX_TIME_S, CampaignSettings, CellFamily
+from hil_sim.studies.campaign.settings import CampaignSettings, CellFamily, default_max_time_s
 from hil_sim.studies.campaign.store import CampaignFolder
 from hil_sim.studies.campaign.summary import firmware_is_safe, summarise
 
@@ -71,7 +71,8 @@ def campaign(
         typer.Option(
             "--max-time-s",
             min=0.1,
-            help="End of a charge in s after it began. Default: 3600, of family real 10800.",
+            help="End of a charge in s after it began. Default: 3600, of family real 10800, "
+            "or what the weakest current of the preset's map needs.",
         ),
     ] = None,
     out: Annotated[
@@ -97,11 +98,13 @@ def campaign(
 
     Example: bms campaign --runs 10000 --jobs 2 --preset lin2014 --out out/campaign
     """
+    chosen, estimator = load_pair(preset, model)
     settings = CampaignSettings(
-        *load_pair(preset, model),
+        chosen,
+        estimator,
         runs=runs,
         seed=seed,
-        max_time_s=MAX_TIME_S[family] if max_time_s is None else max_time_s,
+        max_time_s=default_max_time_s(chosen, family) if max_time_s is None else max_time_s,
         family=family,
         nominal_part=nominal_part,
         mode=None if mode is None else Mode[mode.name],

@@ -15,6 +15,7 @@ from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands import surface_options
 from bms.commands.identify_surface import has_measured_core
 from bms.commands.options import DEFAULT_PROCESSES, JsonOption, out_folder_option, seed_option
+from bms.data.measurements import read_measurements
 from bms.errors import InputError
 from bms.files import make_folder, write_text
 from bms.presets import preset_path
@@ -117,8 +118,10 @@ def _first_step(
     if not files:
         raise InputError("cell: nothing to start from; give recordings, or --preset FILE")
     if not chosen.is_given and has_measured_core(files[0]):
+        # What is wrong with the file itself comes first: no recording, degC, another sign.
+        read_measurements(files[0], core_may_be_copied=True)
         raise InputError(
-            f"{files[0]}: has a measured core or is no recording; identify it with 'bms identify "
+            f"{files[0]}: has a measured core; identify it with 'bms identify "
             "--data CSV --preset PRESET --out FILE', then go on with --preset"
         )
     return preset_from_recordings(files, chosen)

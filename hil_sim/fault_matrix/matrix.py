@@ -12,12 +12,11 @@ from typing import Annotated, Any, Literal, get_args
 from annotated_types import Ge, Gt, Le, Len
 
 from bms.errors import InputError
-from bms.presets import Preset
-from bms.presets.schema import Initial
 from bms.validation import Positive, parse, read_toml, strict
 from hil_sim.bus.catalog import FirstFault, RequiredName
 from hil_sim.bus.database import MessageCodec, load_codecs
 from hil_sim.fault_matrix.needs import Need
+from hil_sim.fault_matrix.size import Size
 from hil_sim.faults.base import Fault
 from hil_sim.faults.frames import MessageName
 from hil_sim.faults.plan import check, parse_fault
@@ -41,6 +40,7 @@ class Start:
 
     A temperature may be given by how far it is below the preset's lower limit, and the fault's
     first period by the share of the preset's strongest current to which the current has grown.
+    What that is for a preset says hil_sim.fault_matrix.place.
     """
 
     soc: Annotated[float, Ge(0.0), Le(1.0)] | None = None
@@ -55,30 +55,6 @@ class Start:
             raise InputError("temperature_K, below_limit_K: give one of them or neither")
         if (self.onset_period is None) == (self.onset_current_share is None):
             raise InputError("onset_period, onset_current_share: give one of them")
-
-    def initial(self, preset: Preset) -> Initial:
-        """Where a cell of the preset begins."""
-        initial, limits = preset.initial, preset.limits
-        temperature_K = self.temperature_K
-        if self.below_limit_K is not None:
-            lower_K = min(limits.max_core_temperature_K, limits.max_surface_temperature_K)
-            temperature_K = lower_K - self.below_limit_K
-        return replace(
-            initial,
-            soc=initial.soc if self.soc is None else self.soc,
-            temperature_K=initial.temperature_K if temperature_K is None else temperature_K,
-        )
-
-    def onset(self, preset: Preset) -> int:
-        """Period of the charge that has the fault first."""
-        if self.onset_period is not None:
-            return self.onset_period
-        assert self.onset_current_share is not None
-        strongest_A = abs(preset.limits.reference_current_A)
-        if preset.current_map is not None:
-            strongest_A = min(strongest_A, max(map(max, preset.current_map.largest_A)))
-        growth_s = self.onset_current_share * strongest_A / preset.limits.current_growth_A_per_s
-        return round(growth_s / preset.timing.sampling_period_s)
 
 
 @strict
@@ -126,6 +102,7 @@ class _Row:
     start: str = "warm"
     realtime: bool = False
     needs: tuple[Need, ...] = ()
+    size: Size | None = None
     note: str = ""
 
 
@@ -149,10 +126,8 @@ class Row:
     realtime: bool
     note: str
     needs: tuple[Need, ...] = ()
-
-    def follow(self, preset: Preset) -> Row:
-        """The row with its fault in the period that the start means for this preset."""
-        return replace(self, fault=replace(self.fault, from_period=self.start.onset(preset)))
+    size: Size | None = None
+    """What of a preset the fault's figures are multiplied with; None for figures as they stand."""
 
     @property
     def latches(self) -> int | None:
@@ -207,6 +182,7 @@ def _expanded(
             realtime=text.realtime,
             note=text.note,
             needs=text.needs,
+            size=text.size,
         )
 
 

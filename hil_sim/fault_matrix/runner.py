@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bms.model.model_file import KanModel
 from bms.presets import Preset
 from hil_sim.bus.catalog import Mode
-from hil_sim.fault_matrix.matrix import Row
+from hil_sim.fault_matrix.matrix import Row, Start
+from hil_sim.fault_matrix.place import Place, find_place, nominal_onset
+from hil_sim.fault_matrix.size import sized
 from hil_sim.fault_matrix.verdict import Verdict, judge
 from hil_sim.run.session import run_both, run_on_clocks
 from hil_sim.run.settings import Settings
@@ -38,16 +40,34 @@ class MatrixSettings:
 def play(settings: MatrixSettings, row: Row) -> Verdict:
     """Run one row and judge it. Raises InputError or BusError."""
     run = run_on_clocks if row.realtime else run_both
-    result = run(run_settings(settings, row))
-    return judge(row.follow(settings.preset), settings.preset, result)
+    place = place_of(settings, row.start)
+    result = run(run_settings(settings, row, place))
+    return judge(_followed(row, settings.preset, place), settings.preset, result)
 
 
-def run_settings(settings: MatrixSettings, row: Row) -> Settings:
+def place_of(settings: MatrixSettings, start: Start) -> Place:
+    """Where rows with a start begin for these settings; found once in a process."""
+    key = (settings.preset.hash, settings.model.hash, settings.seed, start)
+    if key not in _PLACES:
+        _PLACES[key] = find_place(settings.preset, settings.model, start, settings.seed)
+    return _PLACES[key]
+
+
+_PLACES: dict[tuple[str, str, int, Start], Place] = {}
+
+
+def _followed(row: Row, preset: Preset, place: Place) -> Row:
+    """The row with its fault in the period and of the size that fit the preset."""
+    fault = replace(row.fault, from_period=place.onset)
+    return replace(row, fault=sized(fault, row.size, preset))
+
+
+def run_settings(settings: MatrixSettings, row: Row, place: Place) -> Settings:
     """The run of a row: a charge with one fault, until some time after it."""
-    periods = _periods(settings, row)
+    periods = place.onset + row.start.after_periods
     return Settings(
         preset=settings.preset,
-        initial=row.start.initial(settings.preset),
+        initial=place.initial,
         model=settings.model,
         # Rows need a current that is limited by what they disturb, which a plan rarely is.
         mode=Mode.FIXED,
@@ -56,7 +76,7 @@ def run_settings(settings: MatrixSettings, row: Row) -> Settings:
         max_time_s=periods * settings.preset.timing.sampling_period_s,
         realtime=row.realtime,
         answer_timeout_s=_ANSWER_TIMEOUT_S[settings.is_virtual],
-        faults=(row.follow(settings.preset).fault,),
+        faults=(_followed(row, settings.preset, place).fault,),
         ends_early=False,
     )
 
@@ -82,4 +102,4 @@ def play_all(
 
 
 def _periods(settings: MatrixSettings, row: Row) -> int:
-    return row.start.onset(settings.preset) + row.start.after_periods
+    return nominal_onset(settings.preset, row.start) + row.start.after_periods

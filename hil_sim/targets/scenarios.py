@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 from bms.errors import InputError
 from hil_sim.fault_matrix.matrix import Row
-from hil_sim.fault_matrix.runner import MatrixSettings, run_settings
+from hil_sim.fault_matrix.runner import MatrixSettings, place_of, run_settings
 from hil_sim.logs import ALL, Selection
 from hil_sim.logs.recorder import Recorder
 from hil_sim.replay.recording import Recording, load_recording
@@ -62,7 +62,7 @@ def _runs(settings: MatrixSettings, rows: Sequence[Row]) -> Iterator[tuple[str, 
     for row in rows:
         if (reason := why_not_played(row)) is not None:
             raise InputError(f"row '{row.name}': {reason}; leave it out")
-        yield row.name, run_settings(settings, row)
+        yield row.name, run_settings(settings, row, place_of(settings, row.start))
 
 
 def load_scenarios(logs: Sequence[Path], selection: Selection = ALL) -> list[Scenario]:

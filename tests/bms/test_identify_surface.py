@@ -129,6 +129,12 @@ def test_what_the_recordings_do_not_show_is_asked_for(tmp_path: Path) -> None:
         rated_limits({}, [read_cycler(path, FORM)])
 
 
+def test_a_limit_that_is_given_needs_no_recording_that_shows_it(tmp_path: Path) -> None:
+    path = tmp_path / "one.csv"
+    path.write_text(LINES)
+    assert rated_limits(RATED, [read_cycler(path, FORM)]).max_charge_A == 5.0
+
+
 @pytest.mark.parametrize(
     "text",
     [

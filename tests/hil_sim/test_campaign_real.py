@@ -17,7 +17,7 @@ from hil_sim.studies.campaign.noise import streams
 from hil_sim.studies.campaign.real_draws import draw_real
 from hil_sim.studies.campaign.real_summary import family_is_safe, summarise_family
 from hil_sim.studies.campaign.rows import columns, header
-from hil_sim.studies.campaign.settings import CampaignSettings, CellFamily
+from hil_sim.studies.campaign.settings import CampaignSettings, CellFamily, default_max_time_s
 from hil_sim.studies.campaign.worker import run_chunk
 
 PRESET = load_preset("a123_26650_10C")
@@ -198,6 +198,17 @@ def test_each_thing_that_goes_wrong_is_counted_and_fails_the_campaign(changes, k
 def test_99_of_100_charges_have_to_be_complete_in_time(late, is_safe):
     rows = [row_of(outcome="time-limit" if run < late else "complete") for run in range(200)]
     assert family_is_safe(summarise_family(settings_of(200), rows)) is is_safe
+
+
+def test_a_charge_has_the_time_that_the_weakest_current_of_the_map_takes():
+    """A tenth of its current at 0 degC fills this cell in eight hours, whatever controls it."""
+    slow, fast = load_preset("samsung_30q"), load_preset("a123_26650_10C")
+    assert slow.current_map is not None
+    weakest_A = min(map(min, slow.current_map.largest_A))
+    hours = slow.cell.interval.capacity[1] * slow.cell.capacity_Ah / weakest_A
+    assert default_max_time_s(slow, CellFamily.REAL) == pytest.approx(1.1 * 3600.0 * hours, abs=1.0)
+    assert default_max_time_s(slow, CellFamily.PUBLISHED) == 3600.0
+    assert default_max_time_s(fast, CellFamily.REAL) == 10_800.0
 
 
 def test_what_counts_as_a_stop_is_a_command_of_0_A_after_a_current():

@@ -224,6 +224,27 @@ def test_without_anything_to_start_from_it_is_told_what_to_give(bms, tmp_path):
     assert "--preset" in err
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (b"\x90LOGG\xff\xfe", "utf-8"),
+        (b"(0.1) vcan0 100#0011\n", "column time_s"),
+        (
+            b"time_s,current_A,cooling_power_W,surface_temperature_K,coolant_temperature_K,"
+            b"core_temperature_K\n" + b"".join(b"%d,1,0,25,24,26\n" % row for row in range(9)),
+            "likely degrees Celsius",
+        ),
+    ],
+    ids=["blf", "candump", "measured core in degC"],
+)
+def test_a_file_that_is_no_such_recording_is_refused_with_its_own_cause(bms, tmp_path, text, said):
+    path = tmp_path / "foreign.csv"
+    path.write_bytes(text)
+    code, _, err = bms("cell", path, "--out", tmp_path / "out")
+    assert (code, err.count("\n")) == (2, 1)
+    assert said in err
+
+
 def counted(name, reads=(), key=""):
     """A step that writes how often it was taken."""
 

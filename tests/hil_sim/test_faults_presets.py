@@ -7,9 +7,12 @@ from xml.etree import ElementTree
 
 import pytest
 
+from bms.calibration.plausibility import plausibility_fields
 from bms.model.pair import load_pair
+from hil_sim.fault_matrix.place import nominal_initial, nominal_onset
 from hil_sim.fault_matrix.report import MatrixResult, matrix_json, matrix_junit, matrix_page
-from hil_sim.fault_matrix.runner import MatrixSettings, play
+from hil_sim.fault_matrix.runner import MatrixSettings, place_of, play
+from hil_sim.fault_matrix.size import sized
 from tests.hil_sim.test_faults_matrix import ROWS, SETTINGS, is_quick, named
 
 
@@ -24,6 +27,7 @@ LIN2014 = of_preset("lin2014")
 COOL = of_preset("lin2014", max_core_temperature_K=313.0, max_surface_temperature_K=312.0)
 WEAK = of_preset("lin2014", reference_current_A=-6.0)
 FAMILY = of_preset("a123_26650")
+SMALL = MatrixSettings(*load_pair("samsung_30q", None))
 SAMPLE = (
     "lost for good: CellThermal",
     "surface sensor biased cold",
@@ -94,11 +98,46 @@ def test_default_preset_meets_every_need():
 )
 def test_start_follows_the_preset(start, temperature_K, onset):
     row = named({"warm": "surface sensor biased cold", "growing": "current sensor sticks"}[start])
-    assert row.start.initial(COOL.preset).temperature_K == temperature_K
-    assert row.start.onset(COOL.preset) == onset
+    assert nominal_initial(COOL.preset, row.start).temperature_K == temperature_K
+    assert nominal_onset(COOL.preset, row.start) == onset
     # Half of 6 A, growing by 0.5 A a period.
-    assert row.start.onset(WEAK.preset) == {"warm": 90, "growing": 6}[start]
-    assert row.follow(WEAK.preset).fault.from_period == row.start.onset(WEAK.preset)
+    assert nominal_onset(WEAK.preset, row.start) == {"warm": 90, "growing": 6}[start]
+    found = place_of(COOL, row.start)
+    assert (found.initial.temperature_K, found.onset) == (temperature_K, onset)
+
+
+def test_a_row_begins_where_and_when_its_charge_has_a_current():
+    """A kelvin below its limit this family gives none, and its core is unknown at first."""
+    near = replace(named("surface sensor sticks").start, below_limit_K=1.0)
+    found = place_of(SMALL, near)
+    limit_K = SMALL.preset.limits.max_surface_temperature_K
+    assert found.initial.temperature_K == pytest.approx(limit_K - 4.0)
+    assert found.onset == near.onset_period
+    growing = named("current sensor sticks").start
+    assert place_of(SMALL, growing).onset > nominal_onset(SMALL.preset, growing)
+    assert play(SMALL, named("sensor sticks: cooling_power_W")).failures == ()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "current sensor biased a little: offset -0.5",
+        "unit swapped: current_A",
+        "voltage sensor drifts: rate_per_s 0.01",
+    ],
+)
+def test_figures_of_a_fault_follow_the_preset(name):
+    """Of 4 A, half of the permitted deviation is not half an ampere."""
+    verdict = play(SMALL, named(name))
+    assert (verdict.failures, verdict.does_not_apply) == ((), None)
+
+
+def test_figures_are_in_what_the_preset_permits():
+    row = named("current sensor biased a little: offset -0.5")
+    permitted_A = plausibility_fields(SMALL.preset)["current_deviation_A"]
+    assert 0.0 < permitted_A < 0.5
+    assert sized(row.fault, row.size, SMALL.preset).offset == pytest.approx(-0.5 * permitted_A)
+    assert sized(row.fault, row.size, SETTINGS.preset) == row.fault
 
 
 def test_what_does_not_apply_stands_in_every_report():

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bms.presets.agreement import disagreements
+from bms.presets.authoring.firmware_limits import firmware_limits
 from bms.presets.authoring.keys import CHANNELS, explanation, keys
 from bms.presets.authoring.slips import likely_slips
 from bms.presets.schema import Preset
@@ -39,7 +40,10 @@ def complaints(path: Path) -> list[Complaint]:
     wrong = {_plain(complaint.key) for complaint in found}
     found += [one for one in _among_keys(content, wrong) if one not in found]
     if not found:
-        found += [Complaint(*slip) for slip in likely_slips(_value_of(content, frozenset()))]
+        value_of = _value_of(content, frozenset())
+        # A slip of the unit is told rather than that the firmware takes no such number.
+        slips = list(likely_slips(value_of)) or list(firmware_limits(value_of))
+        found += [Complaint(*slip) for slip in slips]
     order = {key: number for number, key in enumerate(keys())}
     return sorted(found, key=lambda complaint: order.get(_plain(complaint.key), len(order)))
 

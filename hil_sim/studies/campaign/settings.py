@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -29,7 +30,25 @@ class CellFamily(str, Enum):
 
 
 MAX_TIME_S = {CellFamily.PUBLISHED: 3600.0, CellFamily.REAL: 10_800.0}
-"""Time limit of a charge unless another is given; cold cells are charged slowly."""
+"""Time limit of a charge unless another is given, at least; cold cells are charged slowly."""
+_OVER_MAP = 1.1
+"""Of the time that the weakest current of a preset's map takes from empty to full."""
+
+
+def default_max_time_s(preset: Preset, family: CellFamily) -> float:
+    """Time limit in s of a charge unless another is given.
+
+    A cell that stays at the cold end of its range gets no more than the weakest current of its
+    preset's map, which no charge control could shorten.
+    """
+    least_s, interval, chosen = MAX_TIME_S[family], preset.cell.interval, preset.current_map
+    if family is not CellFamily.REAL or interval is None or chosen is None:
+        return least_s
+    currents_A = [current_A for row in chosen.largest_A for current_A in row if current_A > 0.0]
+    if not currents_A:
+        return least_s
+    longest_s = interval.capacity[1] * preset.cell.capacity_As / min(currents_A)
+    return max(least_s, float(math.ceil(_OVER_MAP * longest_s)))
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from hil_sim.studies.campaign.noise import streams
 from hil_sim.studies.campaign.real_draws import RealDraw, draw_real
 from hil_sim.studies.campaign.real_summary import OVERFILLED_SOC
 from hil_sim.studies.campaign.rows import FIRMWARE
-from hil_sim.studies.campaign.settings import MAX_TIME_S, CampaignSettings, CellFamily
+from hil_sim.studies.campaign.settings import CampaignSettings, CellFamily, default_max_time_s
 from hil_sim.studies.campaign.worker import play
 from hil_sim.studies.charge_times.prediction import Listener
 
@@ -77,7 +77,7 @@ def charge_family(run: int, seed: int = 0, preset_name: str = PRESET) -> FamilyC
         model,
         runs=run + 1,
         seed=seed,
-        max_time_s=MAX_TIME_S[CellFamily.REAL],
+        max_time_s=default_max_time_s(preset, CellFamily.REAL),
         family=CellFamily.REAL,
         mode=Mode.FASTEST,
     )

@@ -19,7 +19,7 @@ from bms.presets import Preset, load_preset
 from hil_sim.run.session import run_sil
 from hil_sim.run.settings import Settings
 from hil_sim.studies.campaign.rows import header
-from hil_sim.studies.campaign.settings import MAX_TIME_S, CampaignSettings, CellFamily
+from hil_sim.studies.campaign.settings import CampaignSettings, CellFamily, default_max_time_s
 from hil_sim.studies.campaign.worker import run_chunk
 
 RUNS = 400
@@ -59,7 +59,11 @@ def main() -> int:
                 result = run_sil(Settings(variant, model=model, initial=start))
                 times.append(result.summary.charge_time_s or float("nan"))
             settings = CampaignSettings(
-                variant, model, RUNS, max_time_s=MAX_TIME_S[CellFamily.REAL], family=CellFamily.REAL
+                variant,
+                model,
+                RUNS,
+                max_time_s=default_max_time_s(variant, CellFamily.REAL),
+                family=CellFamily.REAL,
             )
             text = header(settings.family) + "".join(
                 run_chunk(settings, c) for c in settings.chunks()
