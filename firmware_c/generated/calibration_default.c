@@ -82,6 +82,10 @@ const bms_calibration_t BMS_DEFAULT_CALIBRATION = {
             .low = 1.5f,
             .high = 4.19999981f,
         },
+        .cooling_power_W = {
+            .low = -1.0f,
+            .high = 40.0f,
+        },
         .surface_temperature_K = {
             .low = 223.0f,
             .high = 373.0f,
@@ -89,10 +93,6 @@ const bms_calibration_t BMS_DEFAULT_CALIBRATION = {
         .coolant_temperature_K = {
             .low = 223.0f,
             .high = 373.0f,
-        },
-        .cooling_power_W = {
-            .low = -1.0f,
-            .high = 40.0f,
         },
         .current_deviation_A = 1.0f,
         .voltage_deviation_V = 0.200000003f,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
-from bms.firmware import Ecu
 from bms.presets import load_preset
 from hil_sim.bus.catalog import Mode
 from hil_sim.run.result import RunResult
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import Settings
+from tests.firmware.edited_ecu import EditedEcu
 
 
 def starting_at(preset: str, temperature_K: float | None) -> Settings:
@@ -36,7 +36,7 @@ def charge(
     """
     settings = replace(starting_at(preset, temperature_K), mode=mode, full_by_s=full_by_s)
     changes = {} if strongest_A is None else {"reference_current_A": strongest_A}
-    return run_both(settings, ecu_factory=lambda plant, database: Ecu(preset, changes=changes))
+    return run_both(settings, ecu_factory=lambda plant, database: EditedEcu(preset, changes))
 
 
 def time_s(result: RunResult) -> float:

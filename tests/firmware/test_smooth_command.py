@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bms.firmware import Ecu
 from bms.firmware._firmware import ffi, lib
 from bms.firmware.calibration import calibration_block
 from bms.firmware.controller import write_decision_input
@@ -22,6 +21,7 @@ from hil_sim.bus.catalog import Mode
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import Settings
 from tests.firmware.bench import HEALTHY, Bench
+from tests.firmware.edited_ecu import EditedEcu
 
 LARGEST_RMS_A, LARGEST_STEP_A = 0.03, 0.15
 PERIODS = 60
@@ -53,7 +53,7 @@ def test_steps_of_a_ridden_limit_are_small_with_noise_on(
     growth_A = {"current_growth_A": LARGEST_STEP_A}
     result = run_both(
         Settings(loaded, initial=initial, mode=mode, seed=seed, max_time_s=time_s),
-        ecu_factory=lambda plant, database: Ecu(preset, changes=growth_A),
+        ecu_factory=lambda plant, database: EditedEcu(preset, growth_A),
     )
     series = result.series
     command_A = np.array([math.nan if c is None else c for c in series.command_A])
