@@ -10,7 +10,7 @@ from bms.image import UNKNOWN_CONTENT
 
 
 class EditedEcu(Ecu):
-    """A plant refuses an ECU that tells of an edited calibration; this one says that it knows not."""
+    """A plant refuses an ECU that tells of an edited calibration; this one tells of none."""
 
     def __init__(self, preset: str, changes: Mapping[str, float]) -> None:
         super().__init__(preset, changes=dict(changes))
