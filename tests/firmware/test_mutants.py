@@ -106,7 +106,7 @@ MUTANTS = [
     Mutant("the fixed mode is not planned", "bms_plan.c", "(mode == MODE_FASTEST) || (mode == MODE_BY_TIME)", "mode <= MODE_FIXED", "tests/firmware/test_charge_mode.py", "wants_none"),
     Mutant("a mode that is gone is not obeyed", "bms_plan.c", "is_valid(bms, CAN_RECEIVED_CHARGE_MODE) ?", "true ?", PLANNED, "goes_away"),
     Mutant("a family's plan ends with its least charge", "bms_plan.c", "start->soc = family->soc_low.soc;", "", PLANNED_FAMILY, "full_in_time"),
-    Mutant("heat without current is no resistance", "bms_plan.c", "if (start->resistance_ohm > greatest_ohm)", "if (greatest_ohm < 0.0f)", PLANNED_FAMILY, "pause"),
+    Mutant("heat without current is no resistance", "bms_plan.c", "/ most_A, greatest_ohm);", "/ most_A, 1e9f);", PLANNED_FAMILY, "pause"),
     Mutant("another goal is planned at once", "bms_plan.c", "if (is_other_goal(bms))", "if (is_other_goal(bms) && (bms->periods == 0u))", PLANNED_FAMILY, "another_goal"),
 ]  # fmt: skip
 

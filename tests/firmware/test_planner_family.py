@@ -52,12 +52,14 @@ def test_the_fastest_charge_of_a_family_is_no_slower_than_the_fixed_one() -> Non
     assert time_s(charge(Mode.FASTEST, None, *WRONGLY_PLUGGED_IN)) <= fixed_s + 1.0
 
 
-@pytest.mark.parametrize("resistance", [1.0, 1.6])
-def test_the_predicted_time_of_a_family_comes_true(resistance: float) -> None:
+@pytest.mark.parametrize(("resistance", "start_K"), [(1.0, 281.0), (1.6, 298.0)])
+def test_the_predicted_time_of_a_family_comes_true(resistance: float, start_K: float) -> None:
     """Within a fifth of the charge, for a cell of middle capacity."""
-    cell = nominal_cell(PRESET, HALF_FULL)
-    cell = replace(cell, cell=scaled(cell.cell, CellFactors(resistance=resistance, capacity=0.9)))
-    result = run_both(Settings(PRESET, initial=HALF_FULL, true_cell=cell, max_time_s=3000.0))
+    initial = replace(HALF_FULL, temperature_K=start_K)
+    cell = nominal_cell(PRESET, initial)
+    factors = CellFactors(resistance=resistance, capacity=0.9)
+    cell = replace(cell, cell=scaled(cell.cell, factors))
+    result = run_both(Settings(PRESET, initial=initial, true_cell=cell, max_time_s=3000.0))
     end_s, series = time_s(result), result.series
     told = [
         abs(predicted - (end_s - time))

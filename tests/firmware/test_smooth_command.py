@@ -39,8 +39,8 @@ def block(name: str) -> Any:
     [
         ("paper_calibrated", 313.0, 0.6, Mode.FASTEST, 700.0),
         ("paper_calibrated", 298.0, 0.6, None, 300.0),
-        ("lin2014", 313.0, 0.3, None, 250.0),
-        ("a123_26650_10C", 313.0, 0.5, None, 200.0),
+        ("lin2014", 313.0, 0.3, None, 290.0),
+        ("a123_26650_10C", 313.0, 0.5, Mode.FIXED, 200.0),
     ],
 )
 @pytest.mark.parametrize("seed", [0, 1])
