@@ -52,10 +52,12 @@ def test_the_fastest_charge_of_a_family_is_no_slower_than_the_fixed_one() -> Non
     assert time_s(charge(Mode.FASTEST, None, *WRONGLY_PLUGGED_IN)) <= fixed_s + 1.0
 
 
-@pytest.mark.parametrize(("resistance", "start_K"), [(1.0, 281.0), (1.6, 298.0)])
-def test_the_predicted_time_of_a_family_comes_true(resistance: float, start_K: float) -> None:
+@pytest.mark.parametrize(("resistance", "start_K", "soc"), [(1.4, 280.0, 0.3), (1.6, 298.0, 0.5)])
+def test_the_predicted_time_of_a_family_comes_true(
+    resistance: float, start_K: float, soc: float
+) -> None:
     """Within a fifth of the charge, for a cell of middle capacity."""
-    initial = replace(HALF_FULL, temperature_K=start_K)
+    initial = replace(PRESET.initial, temperature_K=start_K, soc=soc)
     cell = nominal_cell(PRESET, initial)
     factors = CellFactors(resistance=resistance, capacity=0.9)
     cell = replace(cell, cell=scaled(cell.cell, factors))
