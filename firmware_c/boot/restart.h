@@ -1,8 +1,8 @@
 /* Why the processor starts: a record in memory that outlasts a reset, but not the power.
  *
  * Whoever resets on purpose notes the cause first; the boot stage counts starts with the same cause
- * in a row and, after a few, starts nothing any more until power comes anew. The application ends
- * the row by running for long enough.
+ * in a row and, after a few, starts nothing until another cause comes: power, or the reset line. The
+ * application ends the row by running for long enough.
  */
 #ifndef RESTART_H
 #define RESTART_H
