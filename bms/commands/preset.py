@@ -17,8 +17,8 @@ from bms.commands.options import JsonOption
 from bms.commands.surface_options import GeometryOption
 from bms.errors import InputError
 from bms.files import write_text
-from bms.identification.bpx_cell import known_of
-from bms.identification.bpx_file import read_bpx
+from bms.identification.bpx.cell import known_of
+from bms.identification.bpx.file import read_bpx
 from bms.presets import load_preset, preset_path
 from bms.presets.authoring.complaints import complaints
 from bms.presets.authoring.difference import differences, flattened

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bms.identification.bpx_cell import known_of
-from bms.identification.bpx_file import read_bpx
+from bms.identification.bpx.cell import known_of
+from bms.identification.bpx.file import read_bpx
 from bms.presets import load_preset
 from bms.presets.authoring.complaints import complaints
 from bms.presets.authoring.form import form

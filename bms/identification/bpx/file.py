@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from bms.errors import InputError
-from bms.identification.bpx_function import values
+from bms.identification.bpx.function import values
 from bms.validation import read_json, read_text
 
 ELECTRODES = ("Negative electrode", "Positive electrode")

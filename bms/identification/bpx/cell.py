@@ -8,8 +8,8 @@ import numpy as np
 
 from bms.arrays import Array
 from bms.errors import InputError
-from bms.identification.bpx_file import CONDUCTIVITY, ELECTRODES, ENTROPY, OCP, BpxFile
-from bms.identification.bpx_function import values
+from bms.identification.bpx.file import CONDUCTIVITY, ELECTRODES, ENTROPY, OCP, BpxFile
+from bms.identification.bpx.function import values
 from bms.identification.geometry import SURFACE_SHARE, Shape, shape
 from bms.presets.authoring.firmware_limits import LONGEST_TABLES
 from bms.presets.authoring.form import Known
@@ -224,7 +224,7 @@ def _heat(bpx: BpxFile, chosen: Shape | None) -> Iterator[tuple[str, Known]]:
         )
     resistance = "cell.core_resistance_K_per_W"
     if chosen is None:
-        yield resistance, Known(None, "BPX has no shape: give --geometry to 'bms preset new'")
+        yield resistance, Known(None, "BPX has no shape: give --geometry too")
     else:
         yield resistance, _core_resistance(bpx, chosen)
     cooled = "cell.surface_resistance_K_per_W"
