@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,12 +14,15 @@ from rich.console import Console
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE, with_subcommands
 from bms.commands.options import JsonOption
+from bms.commands.surface_options import GeometryOption
 from bms.errors import InputError
 from bms.files import write_text
+from bms.identification.bpx.cell import known_of
+from bms.identification.bpx.file import read_bpx
 from bms.presets import load_preset, preset_path
 from bms.presets.authoring.complaints import complaints
 from bms.presets.authoring.difference import differences, flattened
-from bms.presets.authoring.form import form
+from bms.presets.authoring.form import Known, form
 from bms.presets.authoring.keys import explanation
 from bms.text_table import TextTable
 
@@ -31,10 +35,19 @@ PresetArgument = Annotated[str, typer.Argument(metavar="PRESET", help=_ONE_OF)]
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the cell.")],
     out: Annotated[Path, typer.Option("--out", help="Preset to write (.toml); none may be there.")],
+    from_bpx: Annotated[
+        Path | None,
+        typer.Option(
+            "--from-bpx", help="BPX file (JSON or YAML) to take from what it tells; extra bpx."
+        ),
+    ] = None,
+    geometry: GeometryOption = None,
 ) -> None:
     """Write an empty preset to fill in: each key with its unit (K, A, ...) and where to find it.
 
-    No number of any cell stands in it; 'bms preset check' says what is still missing.
+    No number of any cell stands in it; 'bms preset check' says what is still missing. With
+    --from-bpx, capacity, open-circuit voltage, dU/dT, heat capacity, voltage limit and more stand
+    in it, each with the field that it is from; with --geometry too, the resistance of the core.
 
     Example: bms preset new my_cell --out my_cell.toml
     """
@@ -44,8 +57,23 @@ def new(
         raise InputError(f"--out {out}: is there already; choose another name, or remove it first")
     if not name.strip():
         raise InputError("NAME: is empty; give the cell a name such as my_cell")
-    write_text(out, form(name))
+    if geometry is not None and from_bpx is None:
+        raise InputError("--geometry: shapes the core of a BPX file; give it with --from-bpx")
+    known = {} if from_bpx is None else known_of(read_bpx(from_bpx), geometry)
+    write_text(out, form(name, known))
+    if from_bpx is not None:
+        _tell_known(known)
     print(f"{out}: fill it in, then 'bms preset check {shlex.quote(str(out))}'")
+
+
+def _tell_known(known: Mapping[str, Known]) -> None:
+    """What a file has told and what it has not, a line for each key."""
+    for key, one in known.items():
+        if one.value is not None and one.note:
+            print(f"{key}: {one.note}")
+    for key, one in known.items():
+        if one.value is None:
+            print(f"{key}: to fill in: {one.note}")
 
 
 def check(preset: PresetArgument, as_json: JsonOption = False) -> int:

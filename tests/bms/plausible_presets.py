@@ -186,7 +186,8 @@ def plausible_presets(draw: st.DrawFn) -> Preset:
         Initial(0.1, 298.15, 0.0),
         OperatingBox(
             (1.05 * current_A, -0.02 * current_A),
-            (0.0, min(cooling_W, RANGES.cooling_power_W[1])),
+            # What cannot be begins 5 % beyond the box, and has to fit on the signal.
+            (0.0, min(cooling_W, 0.95 * RANGES.cooling_power_W[1])),
             (coldest_K, surface_K + 3.0),
             (coldest_K - 8.0, surface_K + 1.0),
         ),

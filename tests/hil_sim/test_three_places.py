@@ -194,7 +194,8 @@ def test_a_constant_that_is_one_bit_off_is_found(tmp_path):
     source.write_text(text.replace(before, after))
     folder = build_variant(HARD_FLOAT, tmp_path / "build", tree=tmp_path)
     ((agreement,),) = agreements_with_host([board(HARD_FLOAT, folder)], load_scenarios([HOT]))
-    assert "StateOfCharge" in agreement.comparison.first.signals
+    assert agreement.comparison.first.signals == ("CalibrationContent",)
+    assert "StateOfCharge" in agreement.comparison.signals
 
 
 @dataclass(frozen=True)
