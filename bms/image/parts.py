@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from functools import lru_cache
+
 from bms.firmware.calibration import calibration_bytes, calibration_hashes
 from bms.firmware.image_header import (
     ANY_TARGET,
@@ -48,7 +51,22 @@ def calibration_content(preset: Preset, model: KanModel) -> int:
 
     First 32 bits of the SHA-256 of its bytes. Raises what calibration_part raises.
     """
-    return content_hashes(calibration_bytes(preset, model))[0]
+    return _content_of(_Pair((preset.hash, model.hash), preset, model))
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """A preset and a model, equal where their hashes are, which are of all that they hold."""
+
+    hashes: tuple[str, str]
+    preset: Preset = field(compare=False)
+    model: KanModel = field(compare=False)
+
+
+@lru_cache(maxsize=16)
+def _content_of(pair: _Pair) -> int:
+    """Every run asks for it, and a family's block takes a third of a second to make."""
+    return content_hashes(calibration_bytes(pair.preset, pair.model))[0]
 
 
 def calibration_of(image: bytes) -> bytes:

@@ -8,7 +8,7 @@ from pathlib import Path
 from bms.errors import InputError
 from hil_sim.bus.buses import Frame
 from hil_sim.bus.catalog import NETWORK_VERSION, Message
-from hil_sim.bus.database import MessageCodec
+from hil_sim.bus.database import MessageCodec, Values
 from hil_sim.bus.identity import Identity
 from hil_sim.logs import LogFrame
 
@@ -19,22 +19,26 @@ def first_identity(
     frames: Iterable[Frame | LogFrame], database: Mapping[str, MessageCodec]
 ) -> Identity | None:
     """What the first Identity among frames with 11-bit identifiers says; None without any."""
-    codec = database[Message.IDENTITY]
-    for frame in frames:
-        if frame.frame_id == codec.frame_id and (values := codec.decode(frame.data)):
-            return Identity.of(values.get)
-    return None
+    values = _first(Message.IDENTITY, frames, database)
+    return None if values is None else Identity.of(values.get)
 
 
 def first_content(
     frames: Iterable[Frame | LogFrame], database: Mapping[str, MessageCodec]
 ) -> int | None:
     """CalibrationContent of the first Start among frames with 11-bit identifiers, if any."""
-    codec = database[Message.START]
+    values = _first(Message.START, frames, database)
+    content = None if values is None else values.get("CalibrationContent")
+    return None if content is None else int(content)
+
+
+def _first(
+    message: str, frames: Iterable[Frame | LogFrame], database: Mapping[str, MessageCodec]
+) -> Values | None:
+    codec = database[message]
     for frame in frames:
         if frame.frame_id == codec.frame_id and (values := codec.decode(frame.data)):
-            content = values.get("CalibrationContent")
-            return None if content is None else int(content)
+            return values
     return None
 
 
