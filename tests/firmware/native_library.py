@@ -25,17 +25,20 @@ def load_library(
     headers: Sequence[str],
     change: tuple[str, str, str] | None = None,
     extra: str = "",
+    flags: Sequence[str] = (),
 ) -> tuple[FFI, Any]:
     """Declarations and library of sources; headers are paths in firmware_c, in order.
 
-    `change` replaces a text in the source of that name by another one; `extra` declares more.
+    `change` replaces a text in the source of that name by another one; `extra` declares more; `flags`
+    are for the compiler.
     """
     out.mkdir(parents=True, exist_ok=True)
     files = [_changed(source, out, change) for source in sources]
     library = out / "library.so"
     includes = [f"-I{FIRMWARE / folder}" for folder in FOLDERS]
     compiler = os.environ.get("CC", "gcc")
-    command = [compiler, *FLAGS, "-O0", "-fPIC", "-shared", *includes, *map(str, files), "-lm"]
+    command = [compiler, *FLAGS, "-O0", "-fPIC", "-shared", *flags, *includes]
+    command += [*map(str, files), "-lm"]
     subprocess.run([*command, "-o", str(library)], check=True)
     ffi = FFI()
     ffi.cdef("\n".join([*(declarations(FIRMWARE / header) for header in headers), extra]))
