@@ -182,6 +182,30 @@ def test_who_asks_for_what_is_allowed_gets_it(code: FamilyCode) -> None:
     assert riding > 200
 
 
+ROUNDED_BESIDE_THE_LIMIT = [
+    (1.9122077226638794, 319.6938781738281, 309.0435485839844, -2.0331830978393555, 3.4024637),
+    (1.163733720779419, 319.3653869628906, 305.69610595703125, -4.747109413146973, 3.4557192),
+    (1.0303840637207031, 317.6961975097656, 295.70648193359375, -3.15012264251709, 3.4388979),
+]
+
+
+@pytest.mark.parametrize("values", ROUNDED_BESIDE_THE_LIMIT)
+def test_a_rounding_at_the_limit_of_the_core_is_not_taken_for_beyond(
+    code: FamilyCode, values: tuple[float, ...]
+) -> None:
+    """Where the heat left at the allowed strength comes out a little below 0, found by search."""
+    family, names = started(code), ("surface_temperature_K", "coolant_temperature_K")
+    temperatures = dict(zip(names, values[1:3]))
+    reading = code.reading(**temperatures, current_A=values[3], voltage_V=values[4])
+    code.observe(family, reading)
+    family.core_room_K = values[0]
+    most = code.decide(family, reading, 23.0)
+    again = code.decide(family, reading, -most.current_A)
+    assert (most.active, again.active) == (lib.RCBF_CORE, lib.RCBF_NONE)
+    assert again.current_A == pytest.approx(most.current_A, rel=1e-6)
+    assert -1e-7 < again.margins[2] < 0.0
+
+
 def family_bench() -> Bench:
     bench = Bench(ecu=Ecu(PRESET))
     bench.follow_command = False

@@ -292,3 +292,19 @@ def test_each_value_of_a_table_that_makes_no_sense_is_refused(code: FamilyCode) 
 def test_a_preset_of_one_cell_needs_no_family(code: FamilyCode) -> None:
     nothing = code.ffi.new("family_constants_t *", {"is_stated": 0})
     assert code.lib.family_constants_are_valid(nothing)
+
+
+@pytest.mark.parametrize("name", ["overpotential_V", "at_least_A", "past_A", "resistance_ohm"])
+def test_heat_that_is_no_number_leaves_no_strength(code: FamilyCode, name: str) -> None:
+    fields = {
+        "overpotential_V": 0.1,
+        "at_least_A": 1.0,
+        "past_A": 2.0,
+        "resistance_ohm": 0.02,
+        "least_resistance_ohm": 0.01,
+        "polarisation_ohm": 0.01,
+    }
+    heat = code.ffi.new("family_heat_t *", {**fields, name: math.nan})
+    assert code.lib.family_measured_strength_A(heat, 0.0, 0.0, 1.0) == -1.0
+    sound = code.ffi.new("family_heat_t *", fields)
+    assert code.lib.family_measured_strength_A(sound, 0.0, 0.0, 1.0) > 0.0

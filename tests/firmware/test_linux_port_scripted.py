@@ -62,6 +62,7 @@ class Kernel:
         self.failures: dict[str, list[int]] = {}
         self.asked: list[tuple[str, int]] = []
         self.drops = 0
+        self.read_ms = 0
         self.stops_ms = 10**9
         self.handlers: dict[int, Any] = {}
         self._callback = self.ffi.callback("int(char *, int, void *)", self._call)
@@ -119,6 +120,7 @@ class Kernel:
         return 0
 
     def _recv(self, _number: int, data: Any) -> int:
+        self.now_ms += self.read_ms
         if not self.waiting or self.waiting[0][0] > self.now_ms:
             return -errno.EAGAIN
         _, (frame_id, content) = self.waiting.pop(0)
@@ -190,6 +192,16 @@ def test_frames_that_got_lost_fail_the_run(
     unread, unsent = lost.get("drops", 0), lost.get("unsent", 0)
     last = f"frames lost: {unread} unread, {unsent} unsent"
     assert capfd.readouterr().out.splitlines()[-1].endswith(last)
+
+
+def test_what_is_over_already_is_not_waited_for(kernel: Kernel) -> None:
+    kernel.waiting = [(100, frame(MEASURED[0], 0, HEALTHY))]
+    kernel.read_ms = 7
+    kernel.failures["wait"] = [0, 0, 0, 0, *[errno.EINTR] * 60]
+    assert kernel.run("vcan0", "--silence-s", "1") == DONE
+    waited_ms = [number for name, number in kernel.asked if name == "wait"]
+    assert 0 < min(waited_ms) and max(waited_ms) <= 100
+    assert len(steps_ms(kernel)) in range(9, 14)
 
 
 @pytest.mark.parametrize("number", [errno.EAGAIN, errno.ENOBUFS, errno.EINTR])

@@ -183,3 +183,44 @@ def test_the_first_layer_spans_what_inputs_reach_where_it_says_so(
     model.spans_reach = spans
     model.tables[edge * 10 : edge * 10 + 2] = knots
     assert accepts(model) is taken
+
+
+@pytest.mark.parametrize(
+    ("x", "was_inside", "inside"),
+    [
+        (-1.5 - 5e-7, True, True),
+        (-1.5 - 5e-7, False, False),
+        (-1.5 - 2e-6, True, False),
+        (1.5 + 5e-7, True, True),
+        (1.5 + 5e-7, False, False),
+        (1.5 + 2e-6, True, False),
+        (NAN, True, False),
+    ],
+)
+def test_an_edge_forgives_a_rounding_beyond_its_knots(
+    x: float, was_inside: bool, inside: bool
+) -> None:
+    flag = ffi.new("bool *", was_inside)
+    assert lib.kan_edge_value(network([1, 1]), 0, x, flag) == 0.0
+    assert flag[0] is inside
+
+
+@pytest.mark.parametrize(
+    ("inputs", "inside"),
+    [
+        ((1.0, -1.0), True),
+        ((1.0 + 5e-7, 0.0), True),
+        ((0.0, -1.0 - 5e-7), True),
+        ((1.0 + 5e-7, -1.0 - 5e-7), True),
+        ((1.0 + 2e-6, 0.0), False),
+        ((1.1, 1.0 + 5e-7), False),
+        ((1.0 + 5e-7, 1.1), False),
+        ((NAN, 0.0), False),
+    ],
+)
+def test_a_network_forgives_a_rounding_beyond_the_box(
+    inputs: tuple[float, float], inside: bool
+) -> None:
+    model = network([2, 1])
+    model.input_scale[0:2] = [1.0, 1.0]
+    assert lib.kan_evaluate(model, ffi.new("float[8]", list(inputs))).in_domain is inside
