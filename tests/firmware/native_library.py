@@ -29,8 +29,8 @@ def load_library(
 ) -> tuple[FFI, Any]:
     """Declarations and library of sources; headers are paths in firmware_c, in order.
 
-    `change` replaces a text in the source of that name by another one; `extra` declares more; `flags`
-    are for the compiler.
+    `change` replaces a text in the source of that name by another one; `extra` declares more;
+    `flags` are for the compiler.
     """
     out.mkdir(parents=True, exist_ok=True)
     files = [_changed(source, out, change) for source in sources]

@@ -141,8 +141,10 @@ def test_a_number_is_taken_up_to_its_bounds_and_not_beyond(
     assert not takes(part, put_value(path, NAN))
 
 
-def several(**values: Any) -> Change:
+def several(first: Change | None = None, **values: Any) -> Change:
     def change(constants: Any) -> None:
+        if first is not None:
+            first(constants)
         for path, value in values.items():
             set_path(constants, path.replace("__", "."), value)
 
@@ -241,7 +243,7 @@ def test_each_branch_of_a_family_is_looked_at(last: int) -> None:
 
     assert takes("family", change)
     for name in branch:
-        assert not takes("family", lambda f: (change(f), setattr(f.branch[last], name, -1.0)))
+        assert not takes("family", several(change, **{f"branch__{last}__{name}": -1.0}))
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,9 @@
-"""Which networks the firmware takes: every condition broken once, alone, and its last good value."""
+"""Which networks the firmware takes: each condition broken once, alone, and its last good value."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ def network(widths: list[int], cells: int = 1, lags: int = 0, directions: int = 
     model.input_reach = 1.5
     for i in range(min(directions, 8)):
         model.direction[i].low, model.direction[i].high = -1.0, 1.0
-    edges = sum(a * b for a, b in zip(widths, widths[1:]))
+    edges = sum(a * b for a, b in pairwise(widths))
     knots = np.linspace(-1.5, 1.5, cells + 1)
     numbers = np.tile(np.append(knots, np.zeros(cells * COEFFICIENTS)), edges)
     fitting = numbers[: len(model.tables)]
@@ -45,7 +46,7 @@ def accepts(model: Any) -> bool:
 )
 def test_sizes_up_to_the_maxima_are_taken(widths: list[int], cells: int) -> None:
     model = network(widths, cells)
-    edges = sum(a * b for a, b in zip(widths, widths[1:]))
+    edges = sum(a * b for a, b in pairwise(widths))
     numbers = edges * (cells + 1 + COEFFICIENTS * cells)
     assert accepts(model)
     assert lib.kan_model_length(model) == ffi.offsetof("kan_model_t", "tables") + 4 * numbers

@@ -1,1 +1,1 @@
-"""Gates: checks of the C core whose records only get better. docs/gates.md tells what each holds."""
+"""Gates: checks of the C core whose records only get better; see docs/gates.md."""

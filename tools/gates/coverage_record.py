@@ -1,4 +1,4 @@
-"""What the coverage gate holds: tests, shares, gaps of each file, and exclusions with their reasons."""
+"""What the coverage gate holds: tests, shares, gaps of each file, exclusions and reasons."""
 
 from __future__ import annotations
 

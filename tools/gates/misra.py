@@ -74,9 +74,7 @@ def area_of(source: str) -> str:
     return next(area for area, folders in AREAS.items() if folder in folders)
 
 
-def complaints(
-    found: Iterable[Violation], record: Mapping[str, Mapping[str, object]]
-) -> list[str]:
+def complaints(found: Iterable[Violation], record: Mapping[str, Mapping[str, object]]) -> list[str]:
     """What differs from the record of deviations; empty when it is kept."""
     counts = Counter((v.rule, area_of(v.source)) for v in found)
     places = {(v.rule, area_of(v.source)): f"{v.source}:{v.line}" for v in found}
