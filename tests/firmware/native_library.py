@@ -16,6 +16,8 @@ from cffi import FFI
 from bms.native_build import FLAGS, declarations
 
 FIRMWARE = Path(__file__).parents[2] / "firmware_c"
+VARIANT = "BMS_SOURCE_VARIANT"
+"""Environment variable with the path of a changed source, which stands for the one of its name."""
 FOLDERS = ("include", "src", "generated", "image", "boot", "port")
 
 
@@ -46,6 +48,9 @@ def load_library(
 
 
 def _changed(source: Path, out: Path, change: tuple[str, str, str] | None) -> Path:
+    variant = Path(os.environ.get(VARIANT, ""))
+    if source.name == variant.name:
+        source = variant
     if change is None or source.name != change[0]:
         return source
     text = source.read_text(encoding="utf-8")

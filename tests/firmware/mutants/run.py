@@ -1,0 +1,185 @@
+"""Tries mutants of the C core on the tests of each source, and holds the survivors to the reviewed.
+
+    python -m tests.firmware.mutants.run [SOURCE...] [--all] [--json]
+
+A process that has loaded what the tests need beside the firmware forks for each mutant. A mutant is
+killed by the first test that fails, by a crash, or by time. results/mutants.json keeps what was
+found for each source; a source that has not changed since is not tried again. A survivor has to
+stand in survivors.toml, with what makes it equivalent or harmless; else the run fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import os
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import hypothesis
+import pytest
+
+from bms.native_build import ROOT
+from tests.firmware.mutants.build import Built, Factory, compiled_firmware, sources_hash
+from tests.firmware.native_library import VARIANT
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+HERE = Path(__file__).parent
+RESULTS = ROOT / "results" / "mutants.json"
+LEFT_OUT = "not mutant and not emulat and not taken_away and not broken_rule"
+_PROFILE = "mutants"
+_HEAVY = ("numpy", "scipy.optimize", "scipy.sparse", "hypothesis", "cantools", "can", "osqp")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """plan.toml: how many mutants of each source, and the tests for them."""
+
+    per_line: float
+    least: int
+    longest_s: int
+    tests: dict[str, list[str]]
+
+    @classmethod
+    def load(cls) -> Plan:
+        return cls(**tomllib.loads((HERE / "plan.toml").read_text(encoding="utf-8")))
+
+    def number(self, source: str) -> int:
+        """How many mutants of a source are tried."""
+        lines = (ROOT / source).read_text(encoding="utf-8").count("\n")
+        return max(self.least, round(self.per_line * lines))
+
+
+def prepare() -> None:
+    """Load what every mutant's tests need, and have hypothesis look for no smallest example."""
+    for name in _HEAVY:
+        importlib.import_module(name)
+    phases = (hypothesis.Phase.explicit, hypothesis.Phase.generate)
+    hypothesis.settings.register_profile(
+        _PROFILE, deadline=None, phases=phases, database=None, derandomize=True
+    )
+
+
+def survives(built: Built, tests: Sequence[str], longest_s: int) -> bool:
+    """Whether all tests pass with the mutant, in a process of its own."""
+    sys.stdout.flush()
+    child = os.fork()
+    if child == 0:
+        os.setpgid(0, 0)
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, 1)
+        os.dup2(null, 2)
+        os.environ[VARIANT] = str(built.source)
+        options = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "-k", LEFT_OUT]
+        options += [f"--hypothesis-profile={_PROFILE}"]
+        if built.extension is not None:
+            options += ["--firmware-build", str(built.extension)]
+        files = [f"tests/firmware/test_{name}.py" for name in tests]
+        os._exit(int(pytest.main([*options, *files])))
+    until = time.monotonic() + longest_s
+    while time.monotonic() < until:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            return os.waitstatus_to_exitcode(status) == 0
+        time.sleep(0.01)
+    os.killpg(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return False
+
+
+def try_source(
+    source: str, factory: Factory, plan: Plan, number: int | None
+) -> tuple[str, dict[str, Any]]:
+    """What became of the drawn mutants of a source; of all of them without a number."""
+    killed, survivors, start_s = 0, [], time.monotonic()
+    for built in islice(factory.built(source), number):
+        if survives(built, plan.tests[source], plan.longest_s):
+            survivors.append(built.mutant.key)
+            print(f"survives: {source}:{built.mutant.line}: {built.mutant.key}", file=sys.stderr)
+        else:
+            killed += 1
+    took = f"{killed} killed, {len(survivors)} survive, {time.monotonic() - start_s:.0f} s"
+    print(f"{source}: {took}", file=sys.stderr, flush=True)
+    return source, {
+        "sha256": sources_hash(source),
+        "tried": killed + len(survivors),
+        "killed": killed,
+        "survivors": sorted(survivors),
+    }
+
+
+def unreviewed(found: dict[str, Any], reviewed: dict[str, str]) -> list[str]:
+    """Survivors that nobody has argued about, and arguments about mutants that are killed."""
+    survivors = {key for entry in found.values() for key in entry["survivors"]}
+    complaints = [
+        f"no argument for the survivor {key}" for key in sorted(survivors - set(reviewed))
+    ]
+    gone = sorted(set(reviewed) - survivors)
+    complaints += [f"{key} is argued about, but it is killed or not made any more" for key in gone]
+    complaints += [
+        f"no words in the argument for {key}" for key, why in reviewed.items() if not why
+    ]
+    return complaints
+
+
+def reviewed_survivors() -> dict[str, str]:
+    """The reviewed list: the argument for each surviving mutant."""
+    content = tomllib.loads((HERE / "survivors.toml").read_text(encoding="utf-8"))
+    return {entry["mutant"]: entry["why"].strip() for entry in content.get("survivor", [])}
+
+
+def kept() -> dict[str, Any]:
+    """What results/mutants.json says of each source; empty without it."""
+    if not RESULTS.is_file():
+        return {}
+    said: dict[str, Any] = json.loads(RESULTS.read_text(encoding="utf-8"))["said"]["sources"]
+    return said
+
+
+def main() -> int:
+    """Try the mutants of changed sources; 1 when a survivor is not in the reviewed list."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("sources", nargs="*", help="try these, changed or not")
+    parser.add_argument("--all", action="store_true", help="every source, every mutant: hours")
+    parser.add_argument("--jobs", type=int, default=2, help="sources at a time")
+    arguments = parser.parse_args()
+    os.chdir(ROOT)
+    plan, found = Plan.load(), kept()
+    wanted = arguments.sources or [
+        source
+        for source in plan.tests
+        if arguments.all or found.get(source, {}).get("sha256") != sources_hash(source)
+    ]
+    wanted.sort(key=plan.number, reverse=True)
+    prepare()
+    with tempfile.TemporaryDirectory() as folder, get_context("fork").Pool(arguments.jobs) as pool:
+        firmware = compiled_firmware(Path(folder) / "firmware")
+        factories = [Factory(firmware, Path(folder) / str(i)) for i in range(len(wanted))]
+        numbers = [None if arguments.all else plan.number(source) for source in wanted]
+        tasks = zip(wanted, factories, [plan] * len(wanted), numbers)
+        found.update(pool.starmap(try_source, tasks, chunksize=1))
+    found = {source: found[source] for source in plan.tests if source in found}
+    complaints = unreviewed(found, reviewed_survivors())
+    for complaint in complaints:
+        print(f"mutants: {complaint}", file=sys.stderr)
+    tried = sum(entry["tried"] for entry in found.values())
+    killed = sum(entry["killed"] for entry in found.values())
+    print(json.dumps({"tried": tried, "killed": killed, "sources": found}, indent=1))
+    return int(bool(complaints))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
