@@ -21,7 +21,7 @@ QUICK_TESTS ?= $(foreach test, calibration_choice charge_mode codec codec_messag
   tests/codegen/test_generated.py $(foreach test, barrier_constants model_file presets, tests/bms/test_$(test).py) \
   $(foreach test, database plant_node replay_golden, tests/hil_sim/test_$(test).py)
 
-.PHONY: help build run quick test lint coverage misra generate models verify-tables long-checks fuzz fuzz-frames fuzz-logs benchmark docs clean
+.PHONY: help build run quick test lint coverage misra mutants proofs generate models verify-tables long-checks fuzz fuzz-frames fuzz-logs benchmark docs clean
 .DEFAULT_GOAL := help
 
 help: ## List the targets
@@ -62,6 +62,12 @@ coverage: .venv/tests .venv/gates build/extensions ## Branches and conditions (M
 
 misra: .venv/tests .venv/gates ## MISRA C:2012 over the C core by cppcheck, against the deviations in tools/gates/misra.toml
 	$(BIN)/python -m tools.gates.misra
+
+mutants: .venv/tests build/extensions ## Mutants of the C sources that have changed since results/mutants.json, on the tests of each
+	$(BIN)/python tools/long_checks.py mutants
+
+proofs: .venv/tests ## What CBMC proves of the C core, for all inputs (tests/firmware/proofs)
+	$(BIN)/python tools/long_checks.py proofs
 
 generate: build/extensions ## Write firmware_c/generated anew from preset, model and CAN database
 	$(BIN)/python -m codegen

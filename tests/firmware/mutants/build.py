@@ -82,9 +82,10 @@ class Factory:
 
 
 def sources_hash(source: str) -> str:
-    """Hash of a source and of all headers, on which its mutants rest."""
+    """Hash of a source and of the core's headers, on which its mutants rest."""
     digest = hashlib.sha256()
-    headers = sorted((ROOT / "firmware_c").rglob("*.h"))
+    folders = ("include", "src", "image", "boot", "port", "port/linux")
+    headers = [h for f in folders for h in sorted((ROOT / "firmware_c" / f).glob("*.h"))]
     for path in (ROOT / source, *headers):
         digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()

@@ -8,6 +8,7 @@ import io
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 RULES = ["universal.rules", "c_like.rules", "c.rules"]
@@ -43,9 +44,7 @@ def _without_comments(text: str) -> list[str]:
 
 def mutants_of(source: str, root: Path) -> Iterator[Mutant]:
     """Every mutant that the rules make, those that do not compile too; the draw is by a hash."""
-    # Not there where nobody asks for mutants: the extra of the tests brings it.
-    from universalmutator.mutator import mutants_regexp
-
+    mutants_regexp = import_module("universalmutator.mutator").mutants_regexp
     lines = _without_comments((root / source).read_text(encoding="utf-8"))
     with contextlib.redirect_stdout(io.StringIO()):
         made = mutants_regexp([f"{line}\n" for line in lines], RULES, ignorePatterns=_NOT_CODE)
