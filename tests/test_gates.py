@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.firmware.mutants.generate import mutants_of
+from tests.firmware.mutants.run import unreviewed
 from tools.gates.coverage import RECORD as COVERAGE_RECORD
 from tools.gates.coverage import FileCoverage
 from tools.gates.coverage_record import Exclusion, Record, RecordError, load_record
@@ -135,3 +137,25 @@ def test_a_rule_is_broken_as_often_as_recorded_and_no_less() -> None:
     assert fewer.endswith("lower it in tools/gates/misra.toml")
     (silent,) = complaints(twice, {"15.5": {"core": 2, "reason": ""}})
     assert silent == "deviation 15.5 has no reason"
+
+
+def test_mutants_are_the_same_each_time_and_change_one_line(tree: Path) -> None:
+    text = "int f(int a)\n{\n    /* a < 0 */\n    return (a < 3) ? 1 : 0;\n}\n"
+    (tree / SOURCE).write_text(text)
+    made = list(mutants_of(SOURCE, tree))
+    assert made == list(mutants_of(SOURCE, tree))
+    assert {m.line for m in made} <= {1, 4}, "no comment is changed"
+    assert any(m.after == "    return (a <= 3) ? 1 : 0;" for m in made)
+    for mutant in made:
+        assert mutant.text(tree).count(mutant.before) == 0 or mutant.before in mutant.after
+
+
+def test_every_survivor_needs_an_argument_and_every_argument_a_survivor() -> None:
+    found = {SOURCE: {"survivors": ["part.c: a -> b"]}}
+    assert unreviewed(found, {"part.c: a -> b": "the same function"}) == []
+    (missing,) = unreviewed(found, {})
+    assert missing == "no argument for the survivor part.c: a -> b"
+    (gone,) = unreviewed({}, {"part.c: a -> b": "the same function"})
+    assert gone.startswith("part.c: a -> b is argued about, but it is killed")
+    (empty,) = unreviewed(found, {"part.c: a -> b": ""})
+    assert empty == "no words in the argument for part.c: a -> b"

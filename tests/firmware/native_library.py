@@ -13,11 +13,13 @@ from typing import Any
 
 from cffi import FFI
 
-from bms.native_build import FLAGS, declarations
+from bms.native_build import FLAGS, SANITIZERS, declarations
 
 FIRMWARE = Path(__file__).parents[2] / "firmware_c"
 VARIANT = "BMS_SOURCE_VARIANT"
 """Environment variable with the path of a changed source, which stands for the one of its name."""
+SANITIZE = "BMS_SANITIZE"
+"""Environment variable with which libraries are built with the sanitizers, too."""
 FOLDERS = ("include", "src", "generated", "image", "boot", "port")
 
 
@@ -39,7 +41,8 @@ def load_library(
     library = out / "library.so"
     includes = [f"-I{FIRMWARE / folder}" for folder in FOLDERS]
     compiler = os.environ.get("CC", "gcc")
-    command = [compiler, *FLAGS, "-O0", "-fPIC", "-shared", *flags, *includes]
+    sanitizers = SANITIZERS if os.environ.get(SANITIZE) else ()
+    command = [compiler, *FLAGS, "-O0", "-fPIC", "-shared", *sanitizers, *flags, *includes]
     command += [*map(str, files), "-lm"]
     subprocess.run([*command, "-o", str(library)], check=True)
     ffi = FFI()

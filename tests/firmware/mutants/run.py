@@ -100,7 +100,7 @@ def survives(built: Built | None, tests: Sequence[str], longest_s: int) -> bool:
         options += [f"--hypothesis-profile={_PROFILE}"]
         if built is not None and built.extension is not None:
             options += ["--firmware-build", str(built.extension)]
-        files = [f"tests/firmware/test_{name}.py" for name in tests]
+        files = [f"tests/firmware/test_{name}{'' if '::' in name else '.py'}" for name in tests]
         os._exit(int(pytest.main([*options, *files])))
     until = time.monotonic() + 20 * longest_s  # of one that waits for what does not come
     while time.monotonic() < until:
