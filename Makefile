@@ -114,6 +114,7 @@ clean: ## Remove everything that set-up, build and runs have made
 .venv/tests: .venv/runtime tools/debian_packages.sh
 	tools/debian_packages.sh
 	$(INSTALL) --no-build-isolation --editable '.[test]'
+	$(INSTALL) --no-deps universalmutator # what it wants beside is for a way of mutating that is not used
 	touch $@
 
 # Other systems have other names for these packages; the gates say what is missing.
