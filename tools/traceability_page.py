@@ -19,11 +19,11 @@ MATRIX = "hil_sim/fault_matrix/matrix.toml"
 KEPT = "results/checks.toml"
 _HEAD = """# From goals to tests
 
-Made by `python -m tools.traceability_page` from the items in `docs/safety/goals` and `docs/safety/requirements`, which are
-[Doorstop](https://doorstop.readthedocs.io)'s. The tests fail when a requirement has no goal, no
-code or no test, when a file or a name in it is gone, when a text has changed without a review, and
-when a test of the firmware or a row of the fault matrix belongs to no requirement.
-"""
+Made by `python -m tools.traceability_page` from the items in `docs/safety/goals` and
+`docs/safety/requirements`, which are [Doorstop](https://doorstop.readthedocs.io)'s. The tests
+fail when a requirement has no goal, no code or no test, when a file or a name in it is gone, when a
+text has changed without a review, and when a test of the firmware or a row of the fault matrix
+belongs to no requirement."""
 
 
 @dataclass(frozen=True)
