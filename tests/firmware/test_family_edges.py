@@ -206,6 +206,50 @@ def test_a_rounding_at_the_limit_of_the_core_is_not_taken_for_beyond(
     assert -1e-7 < again.margins[2] < 0.0
 
 
+def test_a_charger_may_lag_by_two_periods_when_it_is_told_less(code: FamilyCode) -> None:
+    """Commands of three periods bound what it supplies; then it goes its slowest way down."""
+    family, highs = code.observer(), []
+    for command_A in (-5.0, -1.0, -1.0, -1.0):
+        code.observe(family, code.reading(command_A=command_A))
+        highs.append(family.supply_high_A)
+    assert highs[:3] == [5.0, 5.0, 5.0]
+    assert highs[3] == pytest.approx(5.0 - code.k.supply_share * 4.0, rel=1e-6)
+
+
+def test_and_when_it_is_told_more(code: FamilyCode) -> None:
+    family, lows = code.observer(), []
+    for command_A in (0.0, -5.0, -5.0, -5.0):
+        code.observe(family, code.reading(command_A=command_A))
+        lows.append(family.supply_low_A)
+    assert lows[:3] == [0.0, 0.0, 0.0]
+    assert lows[3] == pytest.approx(code.k.supply_share * 5.0, rel=1e-6)
+
+
+def test_every_branch_follows_the_current_between_its_slowest_and_its_fastest(
+    code: FamilyCode,
+) -> None:
+    family, branches, error_A = started(code), code.k.branches, code.k.current_error_A
+    assert branches >= 2
+    code.observe(family, code.reading(current_A=-4.0))
+    code.observe(family, code.reading(current_A=-4.0))
+    for i in range(branches):
+        branch, most_A = code.k.branch[i], 4.0 + error_A
+        # The cell has rested for a period, in which the error alone may have flowed.
+        strong_A = most_A - (most_A - branch.fast * error_A) * (1.0 - branch.fast) ** 2
+        # At the first reading the current has been between 0 A and 4 A.
+        weak_A = branch.slow * (4.0 - error_A)
+        assert family.strong_A[i] == pytest.approx(strong_A, rel=1e-5)
+        assert family.weak_A[i] == pytest.approx(weak_A, rel=1e-5)
+
+
+def test_of_an_unknown_charge_the_emptiest_is_assumed_for_the_heat(code: FamilyCode) -> None:
+    family, voltage_V = code.observer(), 3.3
+    code.observe(family, code.reading(voltage_V=voltage_V))
+    empty_V = code.cell.ocv_V[0]
+    errors_V = code.k.ocv_error_V + code.k.voltage_error_V + 2.0 * family.rest_polarisation_V
+    assert family.overpotential_V == pytest.approx(voltage_V - empty_V + errors_V, abs=1e-5)
+
+
 def family_bench() -> Bench:
     bench = Bench(ecu=Ecu(PRESET))
     bench.follow_command = False
@@ -271,3 +315,12 @@ def test_what_is_missing_or_out_of_range_is_bridged_by_the_observer(
     assert bench.ecu._state.family.bridged == 0
     bench.period(drop, **changes)
     assert bench.ecu._state.family.bridged == 1
+
+
+def test_a_family_whose_core_is_not_known_gets_no_current() -> None:
+    """Nor does the decision for one cell take the place of its own."""
+    bench = charging_bench()
+    bench.ecu._state.family.core_is_known = False
+    bench.period(Current=-2.0)
+    assert (bench.state, bench.command_A) == ("Derated", 0.0)
+    assert bench.answer["ActiveConstraint"] == lib.RCBF_CORE_UNKNOWN

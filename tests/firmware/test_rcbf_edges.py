@@ -95,6 +95,7 @@ def test_each_input_is_taken_up_to_its_bounds_and_not_beyond(path: str) -> None:
         (4.0, 1.0, -math.sqrt(3.0)),
         (100.5, 0.75, -math.sqrt(99.75)),
         (101.0, 0.5, CURRENT_A),
+        (100.0, 0.0625, -math.sqrt(99.9375)),
         (2.0**-9, 2.0**-12, -math.sqrt(2.0**-9 - 2.0**-12)),
         (0.5, 0.75, None),
     ],
@@ -108,6 +109,40 @@ def test_the_current_rides_the_root_of_the_stricter_function(
     decision = solve(k, state(300.0))
     assert decision.feasible is (expected_A is not None)
     assert decision.current_A == pytest.approx(expected_A or 0.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "constant"),
+    [
+        ({}, 11.25),
+        ({"core_temperature_K": (303.0, 0.0)}, 13.25),
+        ({"coolant_temperature_K": (296.0, 0.0)}, 10.25),
+        ({"cooling_power_W": 4.0}, 10.25),
+        ({"cooling_power_W": -7.0}, None),
+    ],
+)
+def test_the_surface_rides_what_its_equation_leaves(
+    changes: dict[str, Any], constant: float | None
+) -> None:
+    """2 (Tc - Ts) + 0.5 (Tinf - Ts) + (limit - Ts) + P - 0.75 - u^2 is not below 0."""
+    k = constants(alpha2_per_s=1e6, a1_per_s=1e6, a3_K_per_A2s=1e-6)
+    k.max_core_temperature_K = (440.0, 0.0)
+    k.max_surface_temperature_K = (304.0, 0.0)
+    k.alpha3_per_s2, k.a10_K_per_Ws2, k.a9_K_per_A2s2 = 1.0, 1.0, -1.0
+    k.a4_per_s2, k.a6_per_s2 = 2.0, 0.5
+    k.delta4_K_per_s2, k.surface_margin_K_per_s2 = 0.5, 0.25
+    known = {
+        "core_temperature_K": (302.0, 0.0),
+        "surface_temperature_K": (300.0, 0.0),
+        "coolant_temperature_K": (298.0, 0.0),
+        "cooling_power_W": 5.0,
+    }
+    decision = solve(k, state(300.0, **{**known, **changes}))
+    if constant is None:
+        assert (decision.feasible, decision.current_A) == (False, 0.0)
+    else:
+        assert decision.active == lib.RCBF_SURFACE
+        assert decision.current_A == pytest.approx(-math.sqrt(constant), rel=1e-6)
 
 
 @pytest.mark.parametrize("voltage_V", [math.nan, math.inf, -math.inf])

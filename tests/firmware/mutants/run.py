@@ -1,6 +1,6 @@
 """Tries mutants of the C core on the tests of each source, and holds the survivors to the reviewed.
 
-    python -m tests.firmware.mutants.run [SOURCE...] [--all] [--json]
+    python -m tests.firmware.mutants.run [SOURCE...] [--all] [--survivors]
 
 A process that has loaded what the tests need beside the firmware forks for each mutant. A mutant is
 killed by the first test that fails, by a crash, or by time. results/mutants.json keeps what was
@@ -42,6 +42,7 @@ HERE = Path(__file__).parent
 RESULTS = ROOT / "results" / "mutants.json"
 PARTIAL = ROOT / "build" / "mutants.json"
 LEFT_OUT = "not mutant and not emulat and not taken_away and not broken_rule"
+NO_KEYS: frozenset[str] = frozenset()
 _PROFILE = "mutants"
 _HEAVY = (
     *("numpy", "scipy.optimize", "scipy.sparse", "cantools.autosar", "can", "osqp", "pydantic"),
@@ -114,12 +115,16 @@ def survives(built: Built | None, tests: Sequence[str], longest_s: int) -> bool:
 
 
 def try_source(
-    source: str, factory: Factory, plan: Plan, number: int | None
+    source: str, factory: Factory, plan: Plan, number: int | None, only: frozenset[str] = NO_KEYS
 ) -> tuple[str, dict[str, Any]]:
-    """What became of the drawn mutants of a source; of all of them without a number."""
+    """What became of the drawn mutants of a source; of all of them without a number.
+
+    With `only`, all but those count as killed without being tried.
+    """
     killed, survivors, start_s = 0, [], time.monotonic()
     for built in islice(factory.built(source), number):
-        if survives(built, plan.tests[source], plan.longest_s):
+        is_tried = not only or built.mutant.key in only
+        if is_tried and survives(built, plan.tests[source], plan.longest_s):
             survivors.append(built.mutant.key)
             print(f"survives: {source}:{built.mutant.line}: {built.mutant.key}", file=sys.stderr)
         else:
@@ -134,7 +139,7 @@ def try_source(
     }
 
 
-def _try(task: tuple[str, Factory, Plan, int | None]) -> tuple[str, dict[str, Any]]:
+def _try(task: tuple[str, Factory, Plan, int | None, frozenset[str]]) -> tuple[str, dict[str, Any]]:
     return try_source(*task)
 
 
@@ -173,6 +178,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("sources", nargs="*", help="try these, changed or not")
     parser.add_argument("--all", action="store_true", help="every source, every mutant: hours")
+    parser.add_argument("--survivors", action="store_true", help="try those again, no others")
     parser.add_argument("--jobs", type=int, default=2, help="sources at a time")
     arguments = parser.parse_args()
     os.chdir(ROOT)
@@ -182,6 +188,10 @@ def main() -> int:
         for source in plan.tests
         if arguments.all or found.get(source, {}).get("sha256") != sources_hash(source)
     ]
+    again = dict.fromkeys(wanted, NO_KEYS)
+    if arguments.survivors:
+        again = {s: frozenset(entry["survivors"]) for s, entry in found.items()}
+        wanted = [source for source in again if again[source]]
     wanted.sort(key=plan.number, reverse=True)
     prepare()
     with tempfile.TemporaryDirectory() as folder, get_context("fork").Pool(arguments.jobs) as pool:
@@ -191,7 +201,8 @@ def main() -> int:
             return 1
         factories = [Factory(firmware, Path(folder) / str(i)) for i in range(len(wanted))]
         numbers = [None if arguments.all else plan.number(source) for source in wanted]
-        tasks = zip(wanted, factories, [plan] * len(wanted), numbers)
+        keys = [again[source] for source in wanted]
+        tasks = zip(wanted, factories, [plan] * len(wanted), numbers, keys)
         for source, entry in pool.imap_unordered(_try, tasks):
             found[source] = entry
             PARTIAL.parent.mkdir(exist_ok=True)
