@@ -250,6 +250,28 @@ def test_of_an_unknown_charge_the_emptiest_is_assumed_for_the_heat(code: FamilyC
     assert family.overpotential_V == pytest.approx(voltage_V - empty_V + errors_V, abs=1e-5)
 
 
+@pytest.mark.parametrize("net_W", [-5.0, -0.3, 0.3])
+def test_a_core_warms_as_the_lightest_and_cools_as_the_heaviest(
+    code: FamilyCode, net_W: float
+) -> None:
+    k, family, reading = code.k, started(code), code.reading(current_A=-4.0)
+    code.observe(family, reading)
+    before_W, strength_A = family.heat_W, 4.0 + k.current_error_A
+    limit_K = code.cell.max_core_temperature_K.high_K + code.cell.max_core_temperature_K.low_K
+    surface_room_K = limit_K - 298.0 - k.surface_error_K
+    disturbance_W = k.disturbance_W + strength_A * (
+        k.disturbance_W_per_A + strength_A * k.disturbance_W_per_A2
+    )
+    gained_W = before_W + disturbance_W
+    family.core_room_K = surface_room_K - (gained_W - net_W) / k.outflow_W_per_K
+    room_K = family.core_room_K
+    code.observe(family, reading)
+    heavier_or_lighter = k.heating_K_per_W if net_W > 0.0 else k.cooling_K_per_W
+    assert family.heat_W == pytest.approx(before_W, abs=0.05), "the readings are the same"
+    moved_K = heavier_or_lighter * (net_W + max(family.heat_W - before_W, 0.0))
+    assert room_K - family.core_room_K == pytest.approx(moved_K, abs=2e-5)
+
+
 def family_bench() -> Bench:
     bench = Bench(ecu=Ecu(PRESET))
     bench.follow_command = False
