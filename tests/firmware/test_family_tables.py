@@ -323,3 +323,12 @@ def test_the_root_keeps_its_digits_whatever_the_sign_of_the_slope(
     expected_A = 2.0 * limit_W / (exact[0] + root) if slope > 0 else (root - exact[0]) / 2e-3
     strength_A = code.lib.family_measured_strength_A(heat, 0.0, slope, limit_W)
     assert strength_A == pytest.approx(expected_A, rel=1e-5)
+
+
+def test_the_voltage_tells_the_charge_between_the_points_too(code: FamilyCode) -> None:
+    points = code.cell.ocv_points
+    soc = np.array(list(code.cell.ocv_soc)[:points], np.float64)
+    voltage = np.array(list(code.cell.ocv_V)[:points], np.float64)
+    for voltage_V in np.linspace(voltage[0] - 0.1, voltage[-1] + 0.1, 101):
+        told = code.lib.family_soc_at(code.cell, voltage_V)
+        assert told == pytest.approx(np.interp(voltage_V, voltage, soc), abs=1e-3)

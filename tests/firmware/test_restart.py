@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import struct
 import time
 from pathlib import Path
@@ -88,6 +89,18 @@ def goes_right(record: Record) -> None:
 
 def test_starts_are_counted_whatever_their_causes(tmp_path: Path) -> None:
     goes_right(Record(tmp_path))
+
+
+def test_a_record_in_which_anything_else_stands_is_no_record(tmp_path: Path) -> None:
+    record = Record(tmp_path)
+    for cause, count in itertools.product(range(5), range(12)):
+        record.clear()
+        record.start()
+        assert record.start(FAULT) == (FAULT, 1, False)
+        memory, is_changed = record.memory, (cause, count) != (FAULT, 1)
+        memory.cause, memory.count = cause, count
+        expected = (POWER_ON, 0, False) if is_changed else (FAULT, 2, False)
+        assert record.start(FAULT) == expected, (cause, count)
 
 
 @pytest.mark.parametrize(

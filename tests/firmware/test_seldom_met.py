@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import zlib
 from typing import Any
 
 import pytest
 
 from bms.firmware import Ecu
 from bms.firmware._firmware import ffi, lib
-from tests.firmware.bench import Bench, frame
+from tests.firmware.bench import HEALTHY, Bench, frame
 from tests.firmware.test_e2e import check, counts, protect
 
 OFF, CHARGE = 0, 1
@@ -207,6 +208,33 @@ def test_a_cell_that_is_never_cool_enough_has_no_plan() -> None:
     assert 0.0 < planner.planned_A <= 10.0 and 0.0 < planner.time_to_full_s < 36_000.0
 
 
+def test_a_plan_starts_from_what_is_read_now() -> None:
+    bench = Bench()
+    bench.start()
+    start = bench.ecu._state.planner.start
+    limit_K = bench.ecu._calibration.rcbf.max_core_temperature_K.high_K
+    read_K = (bench.answer["CoreTemperature"], 299.0, 298.0)
+    for above_K, temperature_K in zip(start.temperature_K, read_K):
+        assert above_K == pytest.approx(temperature_K - limit_K, abs=0.1)
+    assert start.soc == pytest.approx(0.5, abs=1e-3)
+    assert start.cooling_power_W == pytest.approx(0.5, abs=0.01)
+
+
+@pytest.mark.parametrize(("asked_s", "anew"), [(0.0, False), (900.0, True)])
+def test_who_was_in_a_hurry_and_is_no_more_gets_another_plan_at_once(
+    asked_s: float, anew: bool
+) -> None:
+    bench = Bench(values={**HEALTHY, "Mode": BY_TIME, "TimeToFull": 0.0})
+    bench.start()
+    for _ in range(5):
+        bench.period()
+    assert bench.ecu._state.planner.goal.time_left_s == 0.0
+    before_s = bench.ecu._state.planner.age_s
+    bench.period(TimeToFull=asked_s)
+    assert (bench.ecu._state.planner.age_s < before_s) is anew
+    assert bench.ecu._state.planner.goal.time_left_s == pytest.approx(asked_s, abs=1.0)
+
+
 @pytest.mark.parametrize(
     ("planned_A", "reference_A"),
     [(3.0, -3.0), (7.0, -7.0), (9.0, -7.0), (0.0, 0.0), (-3.0, -7.0), (math.nan, -7.0)],
@@ -241,3 +269,8 @@ def test_firmware_of_version_4_is_as_new_as_the_floor_says(
     header = ffi.new("image_header_t *", {"firmware_version": 4})
     found = lib.image_check_floor(ffi.new("image_memory_t *", place), header)
     assert ffi.typeof("image_status_t").elements[found] == status
+
+
+@pytest.mark.parametrize("content", [b"", b"123456789", *(bytes([n, n ^ 0x5A]) for n in range(256))])
+def test_the_crc_of_an_image_is_that_of_zip_files(content: bytes) -> None:
+    assert lib.image_crc32(content, len(content)) == zlib.crc32(content)
