@@ -153,6 +153,50 @@ def test_a_surface_that_says_the_core_is_hotter_is_believed(code: FamilyCode) ->
         assert room_after_window(code, rise_K, gap_K) > 9.0, "a core no hotter, or another heat"
 
 
+@pytest.mark.parametrize("rise_K", [-0.5, 0.5])
+def test_a_rise_counts_with_the_least_and_a_fall_with_the_most(
+    code: FamilyCode, rise_K: float
+) -> None:
+    k, gap_K = code.k, 60.0
+    per_rise = k.least_per_surface_rise if rise_K > 0.0 else k.most_per_surface_fall
+    mean_rise_K = rise_K / k.charge_periods
+    hottest_K = 300.0 + mean_rise_K + rise_K * per_rise
+    hottest_K += gap_K * k.least_per_coolant_gap - k.charge_error_K
+    assert room_after_window(code, rise_K, gap_K) == pytest.approx(323.0 - hottest_K, abs=1e-3)
+
+
+@pytest.mark.parametrize(("rise_K", "gap_K"), [(0.0, 0.0), (0.2, 3.0), (-0.2, 3.0), (0.2, -3.0)])
+def test_at_rest_the_surface_tells_the_hottest_core(
+    code: FamilyCode, rise_K: float, gap_K: float
+) -> None:
+    """No hotter than its mean, or than the surface; from the surface's own balance."""
+    k, family, summed_K = code.k, code.observer(), 5.0
+    periods = k.rest_periods
+    window = {"count": periods - 1, "first_K": 300.0, "sum_K": summed_K, "gap_K": gap_K * periods}
+    family.rest = window
+    surface_K = 300.0 + rise_K
+    at_rest = {"surface_temperature_K": surface_K, "coolant_temperature_K": surface_K}
+    code.observe(family, code.reading(**at_rest))
+    mean_K = 300.0 + (summed_K + rise_K) / periods
+    above_K = max(rise_K, 0.0) * k.per_surface_rise + max(gap_K, 0.0) * k.per_coolant_gap
+    heated_K = periods * k.heating_K_per_W * family.heat_W
+    hottest_K = max(surface_K, mean_K + above_K) + k.rest_error_K + max(heated_K, 0.0)
+    assert family.core_is_known and family.rest.count == 0
+    assert family.core_room_K == pytest.approx(323.0 - hottest_K, abs=1e-3)
+
+
+@pytest.mark.parametrize("current_A", [0.0, 3.0])
+def test_no_current_and_a_load_raise_no_voltage(code: FamilyCode, current_A: float) -> None:
+    family, deviation_V = started(code), 0.01
+    ocv_V = lib.rcbf_open_circuit_voltage_V(code.cell, family.soc_high.soc)
+    highest_V = ocv_V + family.resistance_ohm * code.k.current_error_A + family.polarisation_V
+    highest_V += code.k.ocv_error_V + family.rest_polarisation_V + deviation_V
+    for beside_V, plausible in ((-2e-4, True), (2e-4, False)):
+        reading = code.reading(current_A=current_A, voltage_V=highest_V + beside_V)
+        given = (family, code.k, code.cell, reading, deviation_V)
+        assert lib.family_voltage_is_plausible(*given) is plausible
+
+
 @pytest.mark.parametrize("beyond", [0.9, 1.1])
 def test_only_a_cell_at_rest_is_asked_by_its_voltage_how_full_it_is(
     code: FamilyCode, beyond: float

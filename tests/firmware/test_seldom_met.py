@@ -10,7 +10,7 @@ import pytest
 
 from bms.firmware import Ecu
 from bms.firmware._firmware import ffi, lib
-from tests.firmware.bench import HEALTHY, Bench, frame
+from tests.firmware.bench import HEALTHY, RECEIVED, Bench, frame
 from tests.firmware.test_e2e import check, counts, protect
 
 OFF, CHARGE = 0, 1
@@ -89,6 +89,16 @@ def test_more_frames_than_a_period_can_have_do_not_overflow_their_count() -> Non
     assert measured[:2] == [0, 1], "the first one sets the counter"
     assert measured[252:258] == [252, 253, 254, 255, 255, 255]
     assert set(measured[258:]) == {255}
+
+
+@pytest.mark.parametrize(("index", "state"), [(i, s) for i in range(5) for s in (0, 1, 3)])
+def test_every_message_but_the_optional_one_has_to_be_valid(index: int, state: int) -> None:
+    network = ffi.new("network_t *")
+    for receiver in network.receivers:
+        receiver.state = VALID
+    assert lib.network_is_valid(network)
+    network.receivers[index].state = state
+    assert lib.network_is_valid(network) is (RECEIVED[index] == "ChargeMode")
 
 
 def test_content_of_a_message_that_is_none_is_not_taken() -> None:
@@ -208,6 +218,33 @@ def test_a_cell_that_is_never_cool_enough_has_no_plan() -> None:
     assert 0.0 < planner.planned_A <= 10.0 and 0.0 < planner.time_to_full_s < 36_000.0
 
 
+def test_current_falls_to_a_weaker_plan_by_a_quarter_of_the_growth() -> None:
+    bench = Bench()
+    bench.start()
+    for _ in range(40):
+        bench.period()
+    planner, before_A = bench.ecu._state.planner, bench.command_A
+    assert before_A < -5.0
+    planner.is_searching, planner.age_s, planner.planned_A = False, 0.0, 1.0
+    fall_A = 0.25 * bench.ecu._calibration.current_growth_A
+    for period in (1, 2, 3):
+        bench.period()
+        assert bench.command_A - before_A == pytest.approx(period * fall_A, abs=0.0021)
+
+
+def test_a_current_that_grows_as_fast_as_it_may_is_not_derated() -> None:
+    bench = Bench(values={**HEALTHY, "Mode": FIXED, "ReferenceCurrent": -5.0})
+    bench.start()
+    for _ in range(60):
+        bench.period()
+    assert bench.command_A == pytest.approx(-5.0, abs=0.0021)
+    for _ in range(20):
+        before_A = bench.command_A
+        bench.period(ReferenceCurrent=-15.0)
+        assert bench.command_A < before_A
+        assert bench.state == "Charging"
+
+
 def test_a_plan_starts_from_what_is_read_now() -> None:
     bench = Bench()
     bench.start()
@@ -271,6 +308,8 @@ def test_firmware_of_version_4_is_as_new_as_the_floor_says(
     assert ffi.typeof("image_status_t").elements[found] == status
 
 
-@pytest.mark.parametrize("content", [b"", b"123456789", *(bytes([n, n ^ 0x5A]) for n in range(256))])
+@pytest.mark.parametrize(
+    "content", [b"", b"123456789", *(bytes([n, n ^ 0x5A]) for n in range(256))]
+)
 def test_the_crc_of_an_image_is_that_of_zip_files(content: bytes) -> None:
     assert lib.image_crc32(content, len(content)) == zlib.crc32(content)
