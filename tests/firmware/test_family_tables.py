@@ -332,3 +332,11 @@ def test_the_voltage_tells_the_charge_between_the_points_too(code: FamilyCode) -
     for voltage_V in np.linspace(voltage[0] - 0.1, voltage[-1] + 0.1, 101):
         told = code.lib.family_soc_at(code.cell, voltage_V)
         assert told == pytest.approx(np.interp(voltage_V, voltage, soc), abs=1e-3)
+
+
+@pytest.mark.parametrize("errors", [0.0, 0.5, 1.0, 3.0])
+def test_what_flows_at_least_is_no_less_than_nothing(code: FamilyCode, errors: float) -> None:
+    error_A = code.k.current_error_A
+    heat = code.lib.family_heat(code.observer(), code.k, errors * error_A)
+    assert heat.at_least_A == pytest.approx(max(errors - 1.0, 0.0) * error_A, abs=1e-7)
+    assert heat.at_most_A == pytest.approx((errors + 1.0) * error_A, abs=1e-7)
