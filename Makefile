@@ -63,8 +63,8 @@ coverage: .venv/tests .venv/gates build/extensions ## Branches and conditions (M
 misra: .venv/tests .venv/gates ## MISRA C:2012 over the C core by cppcheck, against the deviations in tools/gates/misra.toml
 	$(BIN)/python -m tools.gates.misra
 
-mutants: .venv/tests build/extensions ## Mutants of the C sources that have changed since results/mutants.json, on the tests of each
-	$(BIN)/python tools/long_checks.py mutants
+mutants: .venv/tests build/extensions ## Mutants of the C sources that have changed since build/mutants.json, on the tests of each
+	$(BIN)/python -m tests.firmware.mutants.run > build/mutants.log
 
 proofs: .venv/tests ## What CBMC proves of the C core, for all inputs (tests/firmware/proofs)
 	$(BIN)/python tools/long_checks.py proofs

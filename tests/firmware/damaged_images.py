@@ -188,6 +188,9 @@ def damaged_images(image: bytes) -> dict[str, Damaged]:
         "block of another layout": bad_calibration(
             "WRONG_CONTENT", patched(calibration, HEADER_LENGTH, layout + 1)
         ),
+        "block of an older layout": bad_calibration(
+            "WRONG_CONTENT", patched(calibration, HEADER_LENGTH, layout - 1)
+        ),
     }
 
 

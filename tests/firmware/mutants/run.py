@@ -3,7 +3,7 @@
     python -m tests.firmware.mutants.run [SOURCE...] [--all] [--survivors]
 
 A process that has loaded what the tests need beside the firmware forks for each mutant. A mutant is
-killed by the first test that fails, by a crash, or by time. results/mutants.json keeps what was
+killed by the first test that fails, by a crash, or by time. build/mutants.json keeps what was
 found for each source; a source that has not changed since is not tried again. A survivor has to
 stand in survivors.toml, with what makes it equivalent or harmless; else the run fails.
 """
@@ -39,8 +39,7 @@ else:
     import tomli as tomllib
 
 HERE = Path(__file__).parent
-RESULTS = ROOT / "results" / "mutants.json"
-PARTIAL = ROOT / "build" / "mutants.json"
+KEPT = ROOT / "build" / "mutants.json"
 LEFT_OUT = "not mutant and not emulat and not taken_away and not broken_rule"
 NO_KEYS: frozenset[str] = frozenset()
 _PROFILE = "mutants"
@@ -122,9 +121,10 @@ def try_source(
     With `only`, all but those count as killed without being tried.
     """
     killed, survivors, start_s = 0, [], time.monotonic()
+    longest_s = plan.longest_s * len(plan.tests[source])
     for built in islice(factory.built(source), number):
         is_tried = not only or built.mutant.key in only
-        if is_tried and survives(built, plan.tests[source], plan.longest_s):
+        if is_tried and survives(built, plan.tests[source], longest_s):
             survivors.append(built.mutant.key)
             print(f"survives: {source}:{built.mutant.line}: {built.mutant.key}", file=sys.stderr)
         else:
@@ -164,12 +164,10 @@ def reviewed_survivors() -> dict[str, str]:
 
 
 def kept() -> dict[str, Any]:
-    """What is known of each source from results/mutants.json and from a run that has not ended."""
+    """What earlier runs have found of each source, those that have not ended too."""
     found: dict[str, Any] = {}
-    if RESULTS.is_file():
-        found.update(json.loads(RESULTS.read_text(encoding="utf-8"))["said"]["sources"])
-    if PARTIAL.is_file():
-        found.update(json.loads(PARTIAL.read_text(encoding="utf-8")))
+    if KEPT.is_file():
+        found = json.loads(KEPT.read_text(encoding="utf-8"))
     return found
 
 
@@ -205,8 +203,8 @@ def main() -> int:
         tasks = zip(wanted, factories, [plan] * len(wanted), numbers, keys)
         for source, entry in pool.imap_unordered(_try, tasks):
             found[source] = entry
-            PARTIAL.parent.mkdir(exist_ok=True)
-            PARTIAL.write_text(json.dumps(found), encoding="utf-8")
+            KEPT.parent.mkdir(exist_ok=True)
+            KEPT.write_text(json.dumps(found), encoding="utf-8")
     found = {source: found[source] for source in plan.tests if source in found}
     complaints = unreviewed(found, reviewed_survivors())
     for complaint in complaints:
