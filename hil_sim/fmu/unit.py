@@ -67,6 +67,11 @@ class Unit:
         """2 or 3."""
         return int(self.description.fmiVersion.split(".")[0])
 
+    @property
+    def last_message(self) -> str:
+        """What the unit has said last; empty for nothing."""
+        return self._log.said
+
     def instantiate(self, *, event_mode: bool = False) -> None:
         """Load the library and make the instance; InputError with what the unit says of it."""
         arguments = {

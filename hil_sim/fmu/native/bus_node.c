@@ -86,9 +86,13 @@ static void forgive(uint32_t *errors)
     }
 }
 
-void bus_node_heard(bus_node_t *node)
+void bus_node_heard(bus_node_t *node, double now_s)
 {
+    if (node->receive_errors >= PASSIVE_FROM) {
+        node->receive_errors = PASSIVE_FROM;
+    }
     forgive(&node->receive_errors);
+    follow_counters(node, now_s);
 }
 
 static void send_again(bus_node_t *node, uint32_t id)

@@ -31,8 +31,8 @@ void bus_node_init(bus_node_t *node);
 /* Puts a frame on its way; lost, and counted, while the node is off the bus. */
 void bus_node_send(bus_node_t *node, const can_frame_t *frame, double now_s);
 
-/* A frame has been received intact. */
-void bus_node_heard(bus_node_t *node);
+/* A frame has been received intact: a passive receiver is active again. */
+void bus_node_heard(bus_node_t *node, double now_s);
 
 /* Takes every operation that carries no frame; one that cannot be read is answered. */
 void bus_node_take(bus_node_t *node, const bus_operation_t *operation, double now_s);

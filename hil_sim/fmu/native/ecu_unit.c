@@ -161,7 +161,7 @@ void ecu_unit_receive(ecu_unit_t *unit, const uint8_t *operations, uint32_t leng
         if (reading == BUS_NO_FRAME) {
             bus_node_take(&unit->node, &operation, unit->now_s);
         } else {
-            bus_node_heard(&unit->node);
+            bus_node_heard(&unit->node, unit->now_s);
         }
         if (reading == BUS_FRAME) {
             turn(unit, &frame);
