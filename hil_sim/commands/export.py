@@ -47,8 +47,8 @@ def export(
         list[UnitKind] | None,
         typer.Option(
             "--fmu",
-            help="Write this unit for co-simulation to --out, in place of the sources there: ecu is "
-            "the firmware on a CAN network, plant the preset's cell. May be repeated.",
+            help="Write this unit for co-simulation to --out instead of the sources: ecu is the "
+            "firmware on a CAN network, plant the preset's cell. May be repeated.",
         ),
     ] = None,
     preset: options.PresetOption = DEFAULT_PRESET,

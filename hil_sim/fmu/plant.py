@@ -26,14 +26,12 @@ IDENTIFIER = "kan_rcbf_plant"
 
 _NATIVE = "hil_sim/fmu/native"
 _SHARED = (
-    "hil_sim/native/cell.[ch]",
-    *(f"{_NATIVE}/{name}" for name in ("plant_unit.[ch]", "plant_variables.h", "thermal_step.[ch]")),
+    *("hil_sim/native/cell.[ch]", f"{_NATIVE}/plant_unit.[ch]"),
+    *(f"{_NATIVE}/plant_variables.h", f"{_NATIVE}/thermal_step.[ch]"),
 )
 _OF_VERSION = {
-    2: tuple(f"{_NATIVE}/{name}" for name in ("plant_fmi2.c", "fmi2.h", "fmi2_absent.c")),
-    3: tuple(
-        f"{_NATIVE}/{name}" for name in ("plant_fmi3.c", "fmi3.h", "fmi3_absent.c", "fmi3_timeless.c")
-    ),
+    2: (f"{_NATIVE}/plant_fmi2.c", f"{_NATIVE}/fmi2*.[ch]"),
+    3: (f"{_NATIVE}/plant_fmi3.c", f"{_NATIVE}/fmi3*.[ch]"),
 }
 _UNITS = {
     "1": {},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
 import weakref
@@ -10,6 +11,7 @@ from collections.abc import Sequence
 from ctypes import byref
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
 
 from bms.errors import InputError, PlantError
 
@@ -80,6 +82,7 @@ class Unit:
             "modelIdentifier": self.description.coSimulation.modelIdentifier,
             "instanceName": self.description.modelName,
         }
+        folder = Path.cwd()
         try:
             if self.major_version == 2:
                 self._slave = self._fmpy.fmi2.FMU2Slave(**arguments)
@@ -90,6 +93,8 @@ class Unit:
         except Exception as error:  # FMPy raises nothing narrower
             said = self._log.said or " ".join(str(error).split())
             raise InputError(f"{self._where}: does not start: {said}") from None
+        finally:
+            os.chdir(folder)  # FMPy stays in the folder of a library that it cannot load
         # Before the folder that the library was loaded from goes.
         weakref.finalize(self, self._slave.freeInstance)
 
@@ -140,31 +145,42 @@ class Unit:
     def _read(self, path: Path) -> ModelDescription:
         if not path.is_file():
             raise InputError(f"{self._where}: no such file; give the path of a unit (.fmu)")
+        description: ModelDescription | None = None
         try:
-            description = self._fmpy.read_model_description(str(path), validate=False)
-            platforms = self._fmpy.supported_platforms(str(path))
+            with zipfile.ZipFile(path) as unit:
+                names = unit.namelist()
+                head = ElementTree.fromstring(unit.read("modelDescription.xml"))
+            version = head.get("fmiVersion") or "of none"
+            if version.split(".")[0] in ("2", "3"):
+                description = self._fmpy.read_model_description(str(path), validate=False)
         except Exception as error:  # FMPy raises nothing narrower
             said = " ".join(str(error).split())
             raise InputError(f"{self._where}: is no unit that FMPy can read ({said})") from None
-        if description.fmiVersion.split(".")[0] not in ("2", "3"):
-            raise InputError(
-                f"{self._where}: is of FMI {description.fmiVersion}; export it for 2.0 or 3.0"
-            )
+        if description is None:
+            raise InputError(f"{self._where}: is of FMI {version}; export it for 2.0 or 3.0")
         if description.coSimulation is None:
             raise InputError(
                 f"{self._where}: is not for co-simulation; export it for that, not for model "
                 "exchange or scheduled execution alone"
             )
-        platform = (
-            self._fmpy.platform if description.fmiVersion[0] == "2" else self._fmpy.platform_tuple
-        )
-        if not {platform, self._fmpy.platform, self._fmpy.platform_tuple} & set(platforms):
-            there = ", ".join(name for name in platforms if name != "c-code") or "none"
-            raise InputError(
-                f"{self._where}: has no library for {platform}, but for {there}; export it for "
-                f"this machine{_remedy_by_sources(platforms)}"
-            )
+        self._require_library(description, names)
         return description
+
+    def _require_library(self, description: ModelDescription, names: Sequence[str]) -> None:
+        fmpy = self._fmpy
+        platform = fmpy.platform if description.fmiVersion[0] == "2" else fmpy.platform_tuple
+        identifier = description.coSimulation.modelIdentifier
+        library = f"binaries/{platform}/{identifier}{fmpy.sharedLibraryExtension}"
+        if library in names:
+            return
+        parts = [name.split("/") for name in names]
+        others = sorted({part[1] for part in parts if part[0] == "binaries" and len(part) == 3})
+        by_sources = any(part[0] == "sources" and part[-1].endswith(".c") for part in parts)
+        remedy = ", or build it from its sources by 'fmpy compile FILE'" if by_sources else ""
+        raise InputError(
+            f"{self._where}: has no {library}, but libraries for {', '.join(others) or 'nothing'}; "
+            f"export it for this machine{remedy}"
+        )
 
     def _try(self, call: Any, *arguments: Any, **named: Any) -> Any:
         self._log.said = ""
@@ -186,7 +202,3 @@ class Unit:
             return callbacks  # messages come without their numbers
         addLoggerProxy(byref(callbacks))
         return callbacks
-
-
-def _remedy_by_sources(platforms: Sequence[str]) -> str:
-    return ", or build it from its sources by 'fmpy compile FILE'" if "c-code" in platforms else ""

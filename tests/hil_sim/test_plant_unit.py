@@ -126,7 +126,9 @@ def test_a_branch_acts_as_in_a_preset_that_has_it(tmp_path, version):
     preset = load_preset(TABLED)
     branches = list(preset.cell.branches)
     branches[1] = replace(branches[1], resistance_ohm=0.01, time_constant_s=30.0)
-    cell = Cell(tmp_path, version, TABLED, branch2_resistance_ohm=0.01, branch2_time_constant_s=30.0)
+    cell = Cell(
+        tmp_path, version, TABLED, branch2_resistance_ohm=0.01, branch2_time_constant_s=30.0
+    )
     plant = Plant(changed(preset, branches=tuple(branches)), calm())
     unit, bus = held(cell, plant, -3.0, 100)
     assert unit == pytest.approx(bus, rel=1e-13)

@@ -1,4 +1,4 @@
-"""What `bms export --fmu` writes: by the standard's own schemas and headers, and always the same."""
+"""What `bms export --fmu` writes: by the standard's schemas and headers, and always the same."""
 
 from __future__ import annotations
 
