@@ -51,11 +51,11 @@ def log_of(path: Path, ecu: Path | None, plant: str, **changes: Any) -> bytes:
 
 
 def test_a_charge_of_both_units_is_that_of_the_bus_frame_by_frame(tmp_path, ecu_path):
-    """To the end of the charge, with the time of every frame."""
+    """With the time of every frame; the page of the docs does it to the end of the charge."""
     plant = written(tmp_path, exported_plant(3), "plant.fmu")
-    units = log_of(tmp_path / "units.log", ecu_path, f"fmu:{plant}")
-    bus = log_of(tmp_path / "bus.log", None, "two-mass")
-    assert len(bus.splitlines()) > 50_000
+    units = log_of(tmp_path / "units.log", ecu_path, f"fmu:{plant}", max_time_s=100.0)
+    bus = log_of(tmp_path / "bus.log", None, "two-mass", max_time_s=100.0)
+    assert len(bus.splitlines()) > 10_000
     assert units == bus
 
 
@@ -64,7 +64,7 @@ def test_with_another_calibration_as_its_resource_it_is_the_ecu_of_that(tmp_path
     preset = load_preset("a123_26650_10C")
     ecu = written(tmp_path, opened(exported_ecu()) | {CALIBRATION: calibrated(preset.name)})
     plant = written(tmp_path, exported_plant(2, preset.name), "plant.fmu")
-    changes = {"preset": preset, "max_time_s": 60.0}
+    changes = {"preset": preset, "max_time_s": 30.0}
     units = log_of(tmp_path / "units.log", ecu, f"fmu:{plant}", **changes)
     assert units == log_of(tmp_path / "bus.log", None, "two-mass", **changes)
 
