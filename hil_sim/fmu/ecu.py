@@ -23,6 +23,7 @@ _SOURCES = (
     *("firmware_c/generated/can_*.[ch]", "firmware_c/port/ecu_loop.[ch]", "firmware_c/port/port.h"),
     *(f"{_NATIVE}/bus_*.[ch]", f"{_NATIVE}/ecu_*.[ch]", f"{_NATIVE}/fmi3.h"),
     f"{_NATIVE}/fmi3_absent.c",
+    f"{_NATIVE}/fmi3_common.c",
 )
 
 

@@ -118,20 +118,22 @@ def test_the_terminal_names_variables_that_there_are_with_the_roles_of_fmi_ls_bu
     assert model.find("CoSimulation").get("hasEventMode") == "true"
 
 
+@pytest.mark.parametrize(
+    "headers", [(), ("-DUNIT_STANDARD_HEADERS", "-Wmissing-prototypes")], ids=["own", "standard"]
+)
 @pytest.mark.parametrize("source", sorted(p.name for p in NATIVE.glob("*.c")))
-def test_the_headers_of_the_standard_declare_what_is_defined(source, tmp_path):
+def test_no_compiler_warns_and_the_headers_of_the_standard_declare_what_is_defined(
+    source, headers, tmp_path
+):
     """They declare every function, so that the compiler sees a wrong argument."""
     for name in ("ecu", "plant"):
         (tmp_path / f"{name}_token.h").write_text(f'#define {name.upper()}_TOKEN "none"\n')
     core = [f"firmware_c/{name}" for name in ("include", "image", "port", "generated")]
     folders = [*(ROOT / name for name in (*core, "hil_sim/native")), FMPY / "c-code", tmp_path]
-    warnings = ["-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion"]
-    prototypes = ["-Wmissing-prototypes", "-Werror", "-fsyntax-only", "-DUNIT_STANDARD_HEADERS"]
+    warnings = ["-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror"]
+    flags = ["-std=c99", *warnings, *headers, "-fsyntax-only", *(f"-I{f}" for f in folders)]
     done = subprocess.run(
-        ["cc", "-std=c99", *warnings, *prototypes, *(f"-I{f}" for f in folders), NATIVE / source],
-        capture_output=True,
-        text=True,
-        check=False,
+        ["cc", *flags, NATIVE / source], capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stderr) == (0, "")
 

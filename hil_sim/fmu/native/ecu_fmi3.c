@@ -37,18 +37,6 @@ static fmi3Status fail(const instance_t *ecu, const char *message)
     return fmi3Error;
 }
 
-FMI3_API const char *fmi3GetVersion(void)
-{
-    return "3.0";
-}
-
-FMI3_API fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean logging, size_t count,
-                                        const fmi3String *categories)
-{
-    (void)instance, (void)logging, (void)count, (void)categories; /* errors are always told */
-    return fmi3OK;
-}
-
 static void start(instance_t *ecu, double now_s)
 {
     ecu->start_s = now_s;
@@ -89,11 +77,6 @@ FMI3_API fmi3Instance fmi3InstantiateCoSimulation(
     return NULL;
 }
 
-FMI3_API void fmi3FreeInstance(fmi3Instance instance)
-{
-    free(instance);
-}
-
 FMI3_API fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean has_tolerance,
                                                 fmi3Float64 tolerance, fmi3Float64 start_s,
                                                 fmi3Boolean has_stop, fmi3Float64 stop_s)
@@ -119,12 +102,6 @@ FMI3_API fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 FMI3_API fmi3Status fmi3EnterStepMode(fmi3Instance instance)
 {
     return fmi3EnterEventMode(instance);
-}
-
-FMI3_API fmi3Status fmi3Terminate(fmi3Instance instance)
-{
-    (void)instance;
-    return fmi3OK;
 }
 
 FMI3_API fmi3Status fmi3Reset(fmi3Instance instance)
@@ -359,14 +336,6 @@ FMI3_API fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *state)
 FMI3_API fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState state)
 {
     memcpy(instance, state, sizeof(instance_t));
-    return fmi3OK;
-}
-
-FMI3_API fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *state)
-{
-    (void)instance;
-    free(*state);
-    *state = NULL;
     return fmi3OK;
 }
 

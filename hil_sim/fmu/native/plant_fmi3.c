@@ -22,18 +22,6 @@ static fmi3Status fail(const instance_t *plant, const char *message)
     return fmi3Error;
 }
 
-FMI3_API const char *fmi3GetVersion(void)
-{
-    return "3.0";
-}
-
-FMI3_API fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean logging, size_t count,
-                                        const fmi3String *categories)
-{
-    (void)instance, (void)logging, (void)count, (void)categories; /* errors are always told */
-    return fmi3OK;
-}
-
 FMI3_API fmi3Instance fmi3InstantiateCoSimulation(
     fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
     fmi3Boolean logging, fmi3Boolean event_mode, fmi3Boolean early_return,
@@ -57,11 +45,6 @@ FMI3_API fmi3Instance fmi3InstantiateCoSimulation(
     }
     plant_unit_start(&plant->unit, 0.0);
     return plant;
-}
-
-FMI3_API void fmi3FreeInstance(fmi3Instance instance)
-{
-    free(instance);
 }
 
 FMI3_API fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean has_tolerance,
@@ -89,12 +72,6 @@ FMI3_API fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 FMI3_API fmi3Status fmi3EnterStepMode(fmi3Instance instance)
 {
     return fail(instance, "the plant has no event mode");
-}
-
-FMI3_API fmi3Status fmi3Terminate(fmi3Instance instance)
-{
-    (void)instance;
-    return fmi3OK;
 }
 
 FMI3_API fmi3Status fmi3Reset(fmi3Instance instance)
@@ -165,14 +142,6 @@ FMI3_API fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState state)
 {
     instance_t *plant = instance;
     plant->unit = *(const plant_unit_t *)state;
-    return fmi3OK;
-}
-
-FMI3_API fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *state)
-{
-    (void)instance;
-    free(*state);
-    *state = NULL;
     return fmi3OK;
 }
 
