@@ -22,6 +22,8 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
+from bms.presets import DEFAULT_PRESET, load_preset
+from hil_sim.fmu.plant import PLANT_FILES, plant_unit
 from tests.firmware.ports import image, needs_compiler
 
 pytestmark = pytest.mark.slow
@@ -225,6 +227,15 @@ def test_the_sources_that_it_exports_are_those_of_the_repository(
     )
     assert written == kept
     assert (anywhere / "core" / "CMakeLists.txt").is_file()
+
+
+def test_the_units_that_it_exports_are_those_of_the_repository(
+    python: Path, anywhere: Path
+) -> None:
+    run(python.with_name("bms"), "export", "--fmu", "plant", "--out", "units", folder=anywhere)
+    preset = load_preset(DEFAULT_PRESET)
+    for version, name in PLANT_FILES.items():
+        assert (anywhere / "units" / name).read_bytes() == plant_unit(preset, version)
 
 
 @needs_compiler
