@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from ctypes import c_double, c_int, c_uint32
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,11 @@ import pytest
 
 from bms.errors import InputError
 from bms.firmware import Ecu
+from bms.firmware._firmware import ffi
+from bms.firmware.calibration import calibration_hashes
+from bms.firmware.image_header import CRC_COVERS_FROM, HEADER_LENGTH, Header
 from bms.image import calibration_part
+from bms.image.seal import sealed_part
 from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset
 from hil_sim.bus.catalog import FrameId
@@ -73,6 +79,24 @@ def flipped(part: bytes) -> bytes:
     return part[:-1] + bytes([part[-1] ^ 1])
 
 
+def edited(part: bytes, place: int, content: bytes, **header: int) -> bytes:
+    """The part with other bytes or another header, and with the hashes that belong to that."""
+    part = part[:place] + content + part[place + len(content) :]
+    changed = replace(Header.parse(part), **header).pack() + part[HEADER_LENGTH:]
+    return sealed_part(changed, *calibration_hashes(part[HEADER_LENGTH:]))
+
+
+def resummed(part: bytes) -> bytes:
+    """Edited by somebody who knows of the CRC-32 but not of the hash."""
+    damaged = flipped(part)
+    crc32 = zlib.crc32(damaged[CRC_COVERS_FROM:])
+    return replace(Header.parse(damaged), crc32=crc32).pack() + damaged[HEADER_LENGTH:]
+
+
+PERIOD_PLACE = HEADER_LENGTH + ffi.offsetof("bms_calibration_t", "sampling_period_s")
+NOT_A_NUMBER = struct.pack("<f", float("nan"))
+
+
 @pytest.mark.parametrize(
     ("edit", "said"),
     [
@@ -81,6 +105,14 @@ def flipped(part: bytes) -> bytes:
         (lambda part: b"\0" + part, "is no calibration"),
         (lambda part: part[:-1], "is truncated"),
         (flipped, r"is damaged \(CRC-32\)"),
+        (resummed, r"was edited after it had been made \(SHA-256\)"),
+        (lambda part: edited(part, 0, b"", firmware_version=1), "is for another firmware version"),
+        (lambda part: edited(part, 0, b"", calibration_layout=1), "has another layout than this"),
+        (lambda part: edited(part, 0, b"", header_layout=1), "has a header of another layout"),
+        (
+            lambda part: edited(part, PERIOD_PLACE, NOT_A_NUMBER),
+            "has a number that the firmware does not accept",
+        ),
         (lambda part: part + b"\0", "has bytes behind its end"),
         (lambda part: part + bytes(100_000), "is longer than any calibration"),
     ],

@@ -105,7 +105,7 @@ static const char *complaint(const ecu_unit_t *unit, uint32_t length)
     if (header->length != length) {
         return "has bytes behind its end";
     }
-    return calibration_is_valid(calibration_of(unit)) ? NULL : "has a constant that cannot be";
+    return calibration_is_valid(calibration_of(unit)) ? NULL : "has a number that the firmware does not accept";
 }
 
 bool ecu_unit_load(ecu_unit_t *unit, const char *folder, char message[ECU_UNIT_MESSAGE_BYTES])
