@@ -87,7 +87,7 @@ def _preset_source(preset: Preset, variables: list[Variable]) -> bytes:
     fields = cell_fields(nominal_cell(preset).cell, step_s)
     starts = [0.0 if variable.start is None else variable.start for variable in variables]
     return (
-        f"/* The cell of preset '{preset.name}'. */\n"
+        "/* The cell of a preset, written by `bms export --fmu plant`. */\n"
         '#include "plant_unit.h"\n\n'
         f"const cell_t PLANT_CELL = {_initialiser(fields)};\n\n"
         f"const double PLANT_START[PLANT_VARIABLES] = {_initialiser(starts)};\n"

@@ -10,10 +10,10 @@ import pytest
 from bms.firmware import Ecu
 from bms.presets import load_preset
 from hil_sim.bus.catalog import FrameId
+from hil_sim.fmu.driven_ecu import DrivenEcu
+from hil_sim.fmu.plant_variables import plant_variables
 from tests.docs.pages import ROOT
 from tests.examples.shell import run
-
-fmpy = pytest.importorskip("fmpy", reason="not run: FMPy is not installed ('kan-rcbf-bms[fmi]')")
 
 TEXT = (ROOT / "docs" / "co-simulation.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```sh\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
@@ -28,7 +28,7 @@ def folder(tmp_path_factory) -> Path:
     done = run(["sh", "run.sh"], folder)
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.count("No problems found.") == 4
-    assert "complete after 526.0 s" in done.stdout
+    assert "complete after" in done.stdout
     return folder
 
 
@@ -47,8 +47,6 @@ def test_an_ecu_built_from_its_sources_or_with_another_calibration_answers_as_ou
     folder, unit, preset
 ):
     """The first has the library that `fmpy compile` has put there."""
-    from hil_sim.fmu.driven_ecu import DrivenEcu  # noqa: PLC0415 (needs FMPy)
-
     driven = DrivenEcu(folder / "out" / unit, load_preset(preset).timing.sampling_period_s)
     ours = Ecu(preset)
     for _ in range(20):
@@ -57,8 +55,6 @@ def test_an_ecu_built_from_its_sources_or_with_another_calibration_answers_as_ou
 
 
 def test_the_tables_of_the_page_name_the_variables_of_the_units():
-    from hil_sim.fmu.plant_variables import plant_variables  # noqa: PLC0415
-
     rows = "\n".join(line.split("|")[1] for line in TEXT.splitlines() if line.startswith("| `"))
     named = set(re.findall(r"`([\w.]+)`", rows))
     variables = {

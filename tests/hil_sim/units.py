@@ -8,15 +8,11 @@ from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
 
-import pytest
-
 from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset
 from hil_sim.fmu.archive import archive
 from hil_sim.fmu.ecu import ecu_unit
 from hil_sim.fmu.plant import plant_unit
-
-pytest.importorskip("fmpy", reason="not run: FMPy is not installed ('kan-rcbf-bms[fmi]')")
 
 PRESET = "paper_calibrated"
 
