@@ -40,6 +40,10 @@ def dashboard(
             "--port", min=0, max=65535, help="Port on this machine; 0 takes any that is free."
         ),
     ] = DEFAULT_PORT,
+    for_s: Annotated[
+        float | None,
+        typer.Option("--for-s", min=0.1, help="End after this time in s. Default: Ctrl-C."),
+    ] = None,
 ) -> int:
     """Serve a page in which the firmware charges a cell, or that shows a running bus.
 
@@ -67,5 +71,5 @@ def dashboard(
         server = Server(make_app(preset, bus, feed), port)
         stack.callback(server.close)
         print(f"{server.address} (Ctrl-C ends)", flush=True)
-        stop.wait()
+        stop.wait(for_s)
     return 0

@@ -10,6 +10,7 @@ from bms.errors import BusError
 from hil_sim.bus.closing import Closing
 from hil_sim.bus.database import load_codecs
 from hil_sim.dashboard.page_data import limits_data
+from hil_sim.fault_matrix.matrix import fault_numbers
 from hil_sim.monitor.listener import Listener
 from hil_sim.monitor.model import Snapshot, SystemModel
 from hil_sim.monitor.presets import PresetFinder
@@ -77,8 +78,8 @@ def _data(snapshot: Snapshot) -> dict[str, Any]:
             name: None if reading.is_stale else reading.value
             for name, reading in snapshot.readings.items()
         },
-        "active": _names(snapshot.faults("ActiveFaults")),
-        "latched": _names(snapshot.faults("LatchedFaults")),
+        "active": _names(snapshot, "ActiveFaults"),
+        "latched": _names(snapshot, "LatchedFaults"),
         "messages": [
             {"id": traffic.frame_id} | _without(asdict(traffic), "frame_id")
             for traffic in snapshot.messages
@@ -87,8 +88,11 @@ def _data(snapshot: Snapshot) -> dict[str, Any]:
     }
 
 
-def _names(faults: list[str] | None) -> list[str] | None:
-    return None if faults is None else [name.lower().replace("_", "-") for name in faults]
+def _names(snapshot: Snapshot, signal: str) -> list[str] | None:
+    bits = snapshot.fault_bits[signal]
+    if bits is None or snapshot.readings[signal].value is None:
+        return None
+    return [name for name, number in fault_numbers().items() if bits >> number & 1]
 
 
 def _without(values: dict[str, Any], name: str) -> dict[str, Any]:

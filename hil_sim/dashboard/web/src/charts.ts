@@ -102,8 +102,10 @@ export class Charts {
   }
 
   setBeside(isOn: boolean): void {
-    this.isBeside = isOn;
-    this.build();
+    if (isOn !== this.isBeside) {
+      this.isBeside = isOn;
+      this.build();
+    }
   }
 
   add(samples: readonly Sample[]): void {

@@ -72,8 +72,9 @@ async function simulate(config: Config, database: Database): Promise<void> {
   const begin = (row?: Row) => {
     controls.setPaused(false);
     tell("");
-    view.charts.clear();
     const { start, request, isBeside } = controls;
+    view.charts.clear();
+    view.charts.setBeside(isBeside);
     post({ type: "begin", start, request, isBeside, ...(row === undefined ? {} : { row }) });
     post({ type: "run", isRunning: true });
   };

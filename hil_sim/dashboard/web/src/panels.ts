@@ -40,7 +40,8 @@ const READINGS: Reading[] = [
     digits: 1,
     unit: "%",
     idle: 0,
-    limit: (limits) => 100 * limits.completion_soc,
+    limit: (limits) => 100 * limits.soc,
+    more: (snapshot) => `full in ${timeToFull(snapshot)}`,
   },
   {
     label: "Surface",
@@ -90,6 +91,12 @@ export function duration(time_s: number): string {
   }
   const minutes = Math.floor(time_s / 60);
   return `${minutes} min ${String(Math.floor(time_s % 60)).padStart(2, "0")} s`;
+}
+
+/** As the firmware predicts it. */
+function timeToFull(snapshot: Snapshot): string {
+  const left_s = snapshot.readings["PredictedTimeToFull"];
+  return left_s === null || left_s === undefined ? NOTHING : duration(left_s);
 }
 
 /** Cards of the readings, each with a bar from an idle value to the limit. */
@@ -167,13 +174,12 @@ export function showDecision(snapshot: Snapshot, codecs: Codecs): void {
       text(readings[of], digits, unit),
     ],
   );
-  const left_s = readings["PredictedTimeToFull"];
   list("decision", [
     ["governs", `${constraint ?? NOTHING}${margin}`, governing === undefined ? "" : "strong"],
     ["admitted", admitted(readings)],
     ...margins,
     ["planned", text(readings["PlannedCurrent"], 2, "A")],
-    ["full in", left_s === null || left_s === undefined ? NOTHING : duration(left_s)],
+    ["full in", timeToFull(snapshot)],
     ["estimate", readings["InDomain"] === 0 ? "outside its domain" : "in its domain"],
     ...beside(snapshot),
   ]);
@@ -198,11 +204,12 @@ export function showFaults(snapshot: Snapshot, codecs: Codecs): void {
   const named = (names: string[] | null) =>
     names === null ? NOTHING : names.length === 0 ? "none" : names.join(", ");
   const bad = (names: string[] | null) => ((names?.length ?? 0) > 0 ? "bad" : "");
-  const first = codecs.choice("FirstFault", snapshot.readings["FirstFault"]);
+  const number = snapshot.readings["FirstFault"] ?? null;
+  const first = number === null ? NOTHING : (codecs.database.faults[number] ?? "none");
   list("faults", [
     ["active", named(snapshot.active), bad(snapshot.active)],
     ["latched", named(snapshot.latched), bad(snapshot.latched)],
-    ["first", first ?? NOTHING],
+    ["first", first],
     ...(snapshot.truth === null
       ? []
       : [

@@ -210,7 +210,10 @@ export class Session {
       const fault = new Fault(row.fault, onset, this.codecs, period_s, this.start.seed);
       this.faults.push(fault);
       const { faults } = this.codecs.database;
-      this.trials.push(new Trial(row, onset, fault.length, this.preset, faults));
+      const trial = new Trial(row, onset, fault.length, this.preset, faults);
+      trial.isDisturbed = this.trials.some((other) => other.acts(onset));
+      this.trials.filter((other) => !other.isOver).forEach((other) => (other.isDisturbed = true));
+      this.trials.push(trial);
     }
     this.planned = this.planned.filter((one) => !isDue(one));
   }

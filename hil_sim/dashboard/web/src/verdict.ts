@@ -131,6 +131,8 @@ function unmet(row: Row, preset: PresetData, before: Period, soc: number): strin
 export class Trial {
   private readonly periods: Period[] = [];
   private before: Period | null = null;
+  /** Another fault acts or has acted, so that what is seen may be of that. */
+  isDisturbed = false;
 
   constructor(
     readonly row: Row,
@@ -143,6 +145,15 @@ export class Trial {
   /** Whether enough has been seen to judge. */
   get isOver(): boolean {
     return this.periods.length > this.row.after_periods;
+  }
+
+  /** Whether the fault, or what it has led to, is not over in a period. */
+  acts(chargePeriod: number): boolean {
+    return (
+      !this.isOver ||
+      chargePeriod < this.onset + this.length ||
+      this.periods.some((period) => period.latched !== 0n)
+    );
   }
 
   note(chargePeriod: number, period: Period): void {
@@ -162,7 +173,7 @@ export class Trial {
       ...latchFailures(row, periods, this.faults),
     ];
     const reason =
-      reaction.length > 0 && isFlowing && before !== null ? unmet(row, this.preset, before, soc) : null;
+      reaction.length > 0 && isFlowing && before !== null ? this.doubt(before, soc) : null;
     const failures = [
       ...(isFlowing ? [] : ["no current flowed before the fault"]),
       ...(reason === null ? reaction : []),
@@ -178,6 +189,12 @@ export class Trial {
       outcome: isDecided ? decided : "running",
       remarks: isDecided ? [...failures, ...(reason === null ? [] : [reason])] : [],
     };
+  }
+
+  private doubt(before: Period, soc: number): string | null {
+    return this.isDisturbed
+      ? "another fault acts in this charge"
+      : unmet(this.row, this.preset, before, soc);
   }
 
   private seen(): string {

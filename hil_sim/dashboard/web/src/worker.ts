@@ -33,7 +33,8 @@ function work(): void {
   }
   const begin_ms = performance.now();
   const { period_s } = engine.preset;
-  owed_s += Math.min((begin_ms - last_ms) / 1000, MOST_BEHIND_S) * factor;
+  const passed_s = Math.min((begin_ms - last_ms) / 1000, MOST_BEHIND_S);
+  owed_s = Number.isFinite(factor) ? owed_s + passed_s * factor : Infinity;
   last_ms = begin_ms;
   while (
     session.end === null &&
@@ -65,7 +66,7 @@ function guarded(): void {
 function resume(): void {
   clearTimeout(timer);
   last_ms = performance.now();
-  owed_s = Number.isFinite(factor) ? 0 : Infinity;
+  owed_s = 0;
   guarded();
 }
 
