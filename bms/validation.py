@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -66,7 +67,14 @@ def refusals(kind: type[T], content: Any) -> list[Refusal]:
 
 def _validated(kind: type[T], content: Any) -> T:
     # A TOML date is no JSON value; as text it is refused where a number is wanted.
-    return TypeAdapter(kind).validate_json(json.dumps(content, allow_nan=True, default=str))
+    adapter: TypeAdapter[T] = _adapter(kind)
+    return adapter.validate_json(json.dumps(content, allow_nan=True, default=str))
+
+
+@cache
+def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
+    """Made once: for the faults of a run that takes longer than all else of their reading."""
+    return TypeAdapter(kind)
 
 
 def _refusals(error: ValidationError) -> list[Refusal]:

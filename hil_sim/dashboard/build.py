@@ -38,6 +38,14 @@ def build(out: Path = STATIC) -> None:
     (out / _MARK).write_text(f"{_sources_hash()}\n", encoding="ascii")
 
 
+def build_if_needed() -> None:
+    """Build the page unless one from the present sources is there; InputError as `build`."""
+    try:
+        require_page()
+    except InputError:
+        build()
+
+
 def require_page(static: Path = STATIC) -> None:
     """Raise InputError where no page has been built, or one from other sources than lie here."""
     mark = static / _MARK

@@ -12,7 +12,6 @@ import socket
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import cache
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -61,6 +60,7 @@ def make_app(preset: str, bus: str | None = None, feed: BusFeed | None = None) -
     config = config_data(bus, load_preset(preset).name)
     places = {name: name for name in config["presets"]} | {config["presets"][0]: preset}
     data = _Data(config, places)
+    threading.Thread(target=data.prepare, args=(config["presets"][0],), daemon=True).start()
 
     async def websocket(socket: WebSocket) -> None:
         await _feed(socket, feed)
@@ -89,15 +89,27 @@ class _Data:
         for name, place in places.items():
             self._makers[name] = _later(preset_data, place)
             self._makers[f"{name}.rows"] = _later(rows_data, place)
-        self._made = cache(lambda name: json.dumps(self._makers[name]()))
+        self._made: dict[str, str] = {}
+        self._lock = threading.Lock()
+
+    def prepare(self, name: str) -> None:
+        """Make what a page asks for first, before it does."""
+        for wanted in ("database", name, f"{name}.rows"):
+            self._make(wanted)
 
     async def answer(self, request: Request) -> Response:
         """The JSON, or 404."""
         name: str = request.path_params["name"]
         if name not in self._makers:
             raise HTTPException(404)
-        content = await run_in_threadpool(self._made, name)
+        content = await run_in_threadpool(self._make, name)
         return Response(content, media_type="application/json")
+
+    def _make(self, name: str) -> str:
+        with self._lock:
+            if name not in self._made:
+                self._made[name] = json.dumps(self._makers[name]())
+            return self._made[name]
 
 
 def _later(make: Callable[[str], object], place: str) -> Callable[[], object]:
@@ -159,6 +171,7 @@ class Server:
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             self._socket.bind((HOST, port))
+            self._socket.listen()  # so that a browser may come at once
         except OSError as error:
             self._socket.close()
             raise InputError(f"--port {port}: {error.strerror}; give another one") from None
@@ -166,7 +179,7 @@ class Server:
         self._server = uvicorn.Server(
             uvicorn.Config(
                 app,
-                log_level="error",
+                log_level="critical",
                 lifespan="off",
                 ws_max_size=_MOST_HEARD,
                 timeout_graceful_shutdown=_GRACE_S,

@@ -4,18 +4,17 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { byId } from "./dom";
 import type { Limits } from "./data";
-import { HISTORY, type Sample } from "./session";
+import { HISTORY } from "./session";
 
 const HEIGHT = 178;
-const MOST_POINTS = 12_000;
-const PLACE = Object.fromEntries(HISTORY.map((name, i) => [name, i])) as Record<
-  (typeof HISTORY)[number],
-  number
->;
+const MOST_POINTS = 3000; // then every second one is dropped
+const REDRAW_MS = 80;
+
+type Column = (typeof HISTORY)[number];
 
 interface Line {
   label: string;
-  of: (sample: Sample) => number;
+  column: Column;
   colour: string; // name of a custom property
   dash?: number[];
   needs?: "simulation" | "beside";
@@ -24,21 +23,19 @@ interface Line {
 interface Chart {
   title: string;
   digits: number;
+  scale?: number;
   lines: Line[];
   limits: (limits: Limits) => { label: string; at: number }[];
 }
-
-const column = (name: (typeof HISTORY)[number], scale = 1) => (sample: Sample) =>
-  scale * sample[PLACE[name]]!;
 
 const CHARTS: Chart[] = [
   {
     title: "Current, A",
     digits: 2,
     lines: [
-      { label: "command", of: column("command_A"), colour: "--line-2" },
-      { label: "current", of: column("current_A"), colour: "--line-1" },
-      { label: "S-CBF", of: column("beside_current_A"), colour: "--line-4", dash: [4, 3], needs: "beside" },
+      { label: "command", column: "command_A", colour: "--line-2" },
+      { label: "current", column: "current_A", colour: "--line-1" },
+      { label: "S-CBF", column: "beside_current_A", colour: "--line-4", dash: [4, 3], needs: "beside" },
     ],
     limits: (limits) => [{ label: "strongest", at: limits.reference_A }],
   },
@@ -46,32 +43,33 @@ const CHARTS: Chart[] = [
     title: "Temperature, K",
     digits: 2,
     lines: [
-      { label: "surface", of: column("surface_K"), colour: "--line-3" },
-      { label: "core, estimated", of: column("estimate_K"), colour: "--line-2" },
-      { label: "core, true", of: column("core_K"), colour: "--line-1", needs: "simulation" },
-      { label: "core, S-CBF", of: column("beside_core_K"), colour: "--line-4", dash: [4, 3], needs: "beside" },
+      { label: "surface", column: "surface_K", colour: "--line-3" },
+      { label: "core, estimated", column: "estimate_K", colour: "--line-2" },
+      { label: "core, true", column: "core_K", colour: "--line-1", needs: "simulation" },
+      { label: "core, S-CBF", column: "beside_core_K", colour: "--line-4", dash: [4, 3], needs: "beside" },
     ],
     limits: (limits) => [{ label: "limit of the core", at: limits.core_K }],
   },
   {
     title: "Voltage, V",
     digits: 3,
-    lines: [{ label: "voltage", of: column("voltage_V"), colour: "--line-1" }],
+    lines: [{ label: "voltage", column: "voltage_V", colour: "--line-1" }],
     limits: (limits) => [{ label: "limit", at: limits.voltage_V }],
   },
   {
     title: "State of charge, %",
     digits: 1,
+    scale: 100,
     lines: [
-      { label: "state of charge", of: column("soc", 100), colour: "--line-1" },
-      { label: "S-CBF", of: column("beside_soc", 100), colour: "--line-4", dash: [4, 3], needs: "beside" },
+      { label: "state of charge", column: "soc", colour: "--line-1" },
+      { label: "S-CBF", column: "beside_soc", colour: "--line-4", dash: [4, 3], needs: "beside" },
     ],
     limits: (limits) => [{ label: "full", at: 100 * limits.completion_soc }],
   },
 ];
 
 export class Charts {
-  private samples: Sample[] = [];
+  private readonly columns = new Map<Column, (number | null)[]>();
   private plots: { plot: uPlot; chart: Chart }[] = [];
   private stride = 1;
   private seen = 0;
@@ -84,14 +82,19 @@ export class Charts {
   ) {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.build());
     new ResizeObserver(() => this.resize()).observe(byId("charts"));
+    this.empty();
     this.build();
   }
 
   clear(): void {
-    this.samples = [];
+    this.empty();
+    this.draw();
+  }
+
+  private empty(): void {
+    HISTORY.forEach((name) => this.columns.set(name, []));
     this.stride = 1;
     this.seen = 0;
-    this.draw();
   }
 
   setLimits(limits: Limits | null): void {
@@ -108,14 +111,20 @@ export class Charts {
     }
   }
 
-  add(samples: readonly Sample[]): void {
-    for (const sample of samples) {
+  /** Takes rows of HISTORY behind each other. */
+  add(samples: Float64Array): void {
+    for (let at = 0; at < samples.length; at += HISTORY.length) {
       if (this.seen++ % this.stride === 0) {
-        this.samples.push(sample);
+        HISTORY.forEach((name, i) => {
+          const value = samples[at + i]!;
+          this.columns.get(name)!.push(Number.isNaN(value) ? null : value);
+        });
       }
     }
-    if (this.samples.length > MOST_POINTS) {
-      this.samples = this.samples.filter((_, i) => i % 2 === 0);
+    while (this.columns.get("time_s")!.length > MOST_POINTS) {
+      for (const [name, values] of this.columns) {
+        this.columns.set(name, values.filter((_, i) => i % 2 === 0));
+      }
       this.stride *= 2;
     }
     this.draw();
@@ -124,10 +133,10 @@ export class Charts {
   private draw(): void {
     if (!this.isDue) {
       this.isDue = true;
-      requestAnimationFrame(() => {
+      setTimeout(() => {
         this.isDue = false;
         this.plots.forEach(({ plot, chart }) => plot.setData(this.data(chart)));
-      });
+      }, REDRAW_MS);
     }
   }
 
@@ -139,13 +148,12 @@ export class Charts {
   }
 
   private data(chart: Chart): uPlot.AlignedData {
-    const times = this.samples.map(column("time_s"));
-    const lines = this.lines(chart).map(({ of }) =>
-      this.samples.map((sample) => {
-        const value = of(sample);
-        return Number.isNaN(value) ? null : value;
-      }),
-    );
+    const times = this.columns.get("time_s") as number[];
+    const scale = chart.scale ?? 1;
+    const lines = this.lines(chart).map(({ column }) => {
+      const values = this.columns.get(column)!;
+      return scale === 1 ? values : values.map((value) => value && scale * value);
+    });
     const limits = (this.limits === null ? [] : chart.limits(this.limits)).map(({ at }) =>
       times.map(() => at),
     );

@@ -9,7 +9,7 @@ import { listen } from "./feed";
 import { Matrix } from "./matrix";
 import type { FromWorker, ToWorker } from "./messages";
 import { duration, ReadingCards, showDecision, showFaults, showTraffic } from "./panels";
-import type { Snapshot } from "./session";
+import { HISTORY, type Snapshot } from "./session";
 import "./style.css";
 
 function tell(message: string): void {
@@ -146,21 +146,17 @@ function watchBus(bus: string, database: Database): void {
       view.setLimits(limits);
       view.show(snapshot);
       const value = (name: string) => snapshot.readings[name] ?? NaN;
-      view.charts.add([
-        [
-          snapshot.time_s,
-          value("Current"),
-          value("CommandCurrent"),
-          value("Voltage"),
-          value("StateOfCharge"),
-          value("SurfaceTemperature"),
-          value("CoreTemperature"),
-          NaN,
-          NaN,
-          NaN,
-          NaN,
-        ],
-      ]);
+      const row = [
+        snapshot.time_s,
+        value("Current"),
+        value("CommandCurrent"),
+        value("Voltage"),
+        value("StateOfCharge"),
+        value("SurfaceTemperature"),
+        value("CoreTemperature"),
+      ];
+      const unknown = HISTORY.slice(row.length).map(() => NaN);
+      view.charts.add(Float64Array.from([...row, ...unknown]));
     },
     ended: (message) => {
       setText(byId("state"), "no feed");

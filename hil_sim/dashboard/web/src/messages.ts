@@ -2,7 +2,7 @@
 
 import type { Database, PresetData, Row } from "./data";
 import type { Start } from "./native";
-import type { Request, Sample, Snapshot } from "./session";
+import type { Request, Snapshot } from "./session";
 
 export type ToWorker =
   | { type: "load"; module: WebAssembly.Module; database: Database; preset: PresetData }
@@ -15,6 +15,6 @@ export type ToWorker =
   | { type: "log" };
 
 export type FromWorker =
-  | { type: "snapshot"; run: number; snapshot: Snapshot; samples: Sample[] }
+  | { type: "snapshot"; run: number; snapshot: Snapshot; samples: Float64Array }
   | { type: "log"; lines: string[] }
   | { type: "error"; message: string };

@@ -29,8 +29,7 @@ export interface Request {
   cooling_W: number;
 }
 
-/** A row of the history: see HISTORY. */
-export type Sample = number[];
+/** Columns of a period's row in the history. */
 export const HISTORY = [
   "time_s",
   "current_A",
@@ -78,7 +77,7 @@ export class Session {
   private trials: Trial[] = [];
   private planned: { row: Row; onset: number }[] = [];
   private beside: { is_running: boolean; periods: number; full_s: number | null } | null = null;
-  private samples: Sample[] = [];
+  private samples: number[] = []; // rows of HISTORY behind each other
 
   constructor(
     private readonly native: Native,
@@ -157,9 +156,9 @@ export class Session {
     }
   }
 
-  /** What has been noted since the last call. */
-  takeSamples(): Sample[] {
-    const taken = this.samples;
+  /** Rows of HISTORY behind each other, of what has been noted since the last call. */
+  takeSamples(): Float64Array {
+    const taken = Float64Array.from(this.samples);
     this.samples = [];
     return taken;
   }
@@ -298,7 +297,7 @@ export class Session {
     const truth = this.native.look();
     const readings = this.traffic.readings();
     const beside = this.beside === null ? null : this.native.lookBeside();
-    this.samples.push([
+    this.samples.push(
       this.time_s,
       truth.current_A,
       command?.["CommandCurrent"] ?? NaN,
@@ -310,7 +309,7 @@ export class Session {
       beside?.current_A ?? NaN,
       beside?.core_K ?? NaN,
       beside?.soc ?? NaN,
-    ]);
+    );
     const period: Period = {
       usable_A,
       flowing_A: truth.current_A,
