@@ -144,7 +144,7 @@ export class Trial {
 
   /** Whether enough has been seen to judge. */
   get isOver(): boolean {
-    return this.periods.length > this.row.after_periods;
+    return this.periods.length >= this.row.after_periods;
   }
 
   /** Whether the fault, or what it has led to, is not over in a period. */
