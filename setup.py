@@ -1,4 +1,4 @@
-"""Everything is in pyproject.toml, except that setuptools takes cffi modules here only, and the page."""
+"""Everything is in pyproject.toml, except what setuptools takes here only: cffi modules, page."""
 
 import sys
 from pathlib import Path

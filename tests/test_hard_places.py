@@ -45,6 +45,7 @@ COMMANDS: dict[str, tuple[int, str]] = {
     "ecu": (0, f"--bus {BUS} --silence-s 1"),
     "plant": (1, f"--bus {BUS} --max-time-s 1 --answer-timeout-s 20 --out DIR/out"),
     "monitor": (0, f"--bus {BUS} --for-s 0.2"),
+    "dashboard": (0, f"--bus {BUS} --port 0 --for-s 0.2"),
     "replay": (0, "GOLDEN/message_loss.log.gz"),
     "fault-matrix": (0, "--rows once --jobs 2 --out DIR/out"),
     "campaign": (0, "--runs 2 --jobs 2 --max-time-s 5 --out DIR/out"),

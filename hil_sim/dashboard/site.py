@@ -1,6 +1,6 @@
-"""Writes the page as files, for a server that only hands out files: `make docs` puts it on the site.
+"""Writes the page as files, which any server can hand out; `make docs` puts it on the site.
 
-    python -m hil_sim.dashboard.site FOLDER
+python -m hil_sim.dashboard.site FOLDER
 """
 
 from __future__ import annotations

@@ -28,8 +28,10 @@ PLAY = """async (name) => {
   const worker = new Worker(script.name, { type: "module" });
   const row = rows.find((one) => one.name === name);
   const { soc, temperature_K, cooling_power_W } = row.start;
-  const start = { seed: 0, soc, temperature_K, cooling_power_W, resistance_factor: 1, capacity_factor: 1 };
-  const request = { mode: "fixed", reference_A: preset.limits.reference_A, full_by_s: 0, cooling_W: cooling_power_W };
+  const factors = { resistance_factor: 1, capacity_factor: 1 };
+  const start = { seed: 0, soc, temperature_K, cooling_power_W, ...factors };
+  const { reference_A } = preset.limits;
+  const request = { mode: "fixed", reference_A, full_by_s: 0, cooling_W: cooling_power_W };
   let verdict = null;
   const log = await new Promise((resolve, reject) => {
     worker.onmessage = ({ data }) => {
@@ -62,7 +64,9 @@ def page():
 
 
 @pytest.mark.parametrize("kind", sorted(ROWS))
-def test_a_kind_of_fault_gives_the_frames_and_the_verdict_of_the_matrix(page, preset, tmp_path, kind):
+def test_a_kind_of_fault_gives_the_frames_and_the_verdict_of_the_matrix(
+    page, preset, tmp_path, kind
+):
     row = ROWS[kind]
     place = Place(nominal_initial(preset, row.start), nominal_onset(preset, row.start))
     settings = MatrixSettings(preset, load_shipped_model(preset.name))
