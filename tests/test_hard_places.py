@@ -23,6 +23,7 @@ from bms.model.model_file import shipped_model_path
 from bms.presets.authoring.form import form
 from tests.bms.kan_samples import write_recording
 from tests.firmware.ports import built, needs_emulator
+from tests.hil_sim.dashboard_page import needs_page
 
 pytestmark = pytest.mark.slow
 
@@ -38,6 +39,7 @@ BUS = "udp_multicast:239.74.163.89"
 EXTRAS = {
     "plating": "pybamm", "optimum": "cvxpy", "compare-charges": "cvxpy", "tune": "cvxpy",
 }  # fmt: skip
+MARKS = {"flash": needs_emulator, "dashboard": needs_page}
 Started = subprocess.Popen[bytes]
 
 COMMANDS: dict[str, tuple[int, str]] = {
@@ -203,7 +205,7 @@ def test_this_user_may_write_neither_home_nor_installation(user: list[str], fold
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=needs_emulator) if name == "flash" else name
+        pytest.param(name, marks=MARKS.get(name, ()))
         for name in COMMANDS
         if name not in {"ecu", "plant"}
     ],

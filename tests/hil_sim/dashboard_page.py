@@ -105,12 +105,11 @@ def saved_log(page: Any, folder: Path) -> Path:
 
 
 def draw_charge(page: Any, path: Path) -> None:
-    """The page after a charge with S-CBF beside it."""
-    set_speed(page, "as fast as it goes")
+    """The page while a limit takes current away, with S-CBF beside the charge."""
     page.check("#beside")
     page.get_by_role("button", name="Charge anew").click()
-    page.wait_for_selector('body[data-end=""]')
-    wait_for_end(page)
+    page.locator("#decision", has_text="core, margin").wait_for()
+    page.get_by_role("button", name="Pause").click()
     page.wait_for_timeout(300)
     page.screenshot(path=path)
 

@@ -153,6 +153,8 @@ export class Session {
       this.prepare(state);
       this.native.advance();
       this.advanceBeside();
+    } else {
+      this.finishBeside();
     }
   }
 
@@ -365,6 +367,13 @@ export class Session {
     beside.periods++;
     if (!beside.is_running) {
       beside.full_s = Math.max(0, beside.periods - OFF_PERIODS - 1) * this.preset.period_s;
+    }
+  }
+
+  /** Its time to full is worth knowing, also where it takes longer. */
+  private finishBeside(): void {
+    while (this.beside?.is_running === true) {
+      this.advanceBeside();
     }
   }
 
