@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from bms.commands.options import preset_option
+from bms.commands.options import ModelOption, preset_option
 from bms.errors import InputError
 from bms.presets import DEFAULT_PRESET
 from hil_sim.bus.buses import require_shared
@@ -34,6 +34,7 @@ def dashboard(
         str,
         preset_option("Preset that the page begins with", DEFAULT_PRESET),
     ] = DEFAULT_PRESET,
+    model: ModelOption = None,
     port: Annotated[
         int,
         typer.Option(
@@ -68,7 +69,7 @@ def dashboard(
         if bus is not None:
             require_shared(bus)
             feed = stack.enter_context(BusFeed(bus, preset_finder(None), WallClock()))
-        server = Server(make_app(preset, bus, feed), port)
+        server = Server(make_app(preset, model, bus, feed), port)
         stack.callback(server.close)
         print(f"{server.address} (Ctrl-C ends)", flush=True)
         stop.wait(for_s)

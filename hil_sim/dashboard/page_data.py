@@ -9,6 +9,7 @@ import base64
 from collections.abc import Sequence
 from dataclasses import asdict
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from bms.calibration.plausibility import plausibility_fields
@@ -70,12 +71,12 @@ def database_data() -> dict[str, Any]:
     }
 
 
-def preset_data(name: str) -> dict[str, Any]:
-    """A preset, by name or path, for the plant and the controls.
+def preset_data(name: str, model_path: Path | None = None) -> dict[str, Any]:
+    """A preset, by name or path, with its model for the plant and the controls.
 
     Raises InputError or ModelMismatchError as load_pair.
     """
-    preset, model = load_pair(name, None)
+    preset, model = load_pair(name, model_path)
     box = preset.operating_box
     coldest_K, hottest_K = box.surface_temperature_K
     low_W, high_W = box.cooling_power_W

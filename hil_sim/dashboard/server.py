@@ -12,7 +12,8 @@ import socket
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import Any
+from functools import partial
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import uvicorn
@@ -29,10 +30,13 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from bms.errors import InputError
-from bms.presets import load_preset
+from bms.model.pair import load_pair
 from hil_sim.dashboard.build import STATIC
 from hil_sim.dashboard.feed import BusFeed
 from hil_sim.dashboard.page_data import config_data, database_data, preset_data, rows_data
+
+Maker = Callable[[], object]
+"""Makes what becomes JSON."""
 
 HOST = "127.0.0.1"
 _HOSTS = (HOST, "localhost")
@@ -51,16 +55,23 @@ _HEADERS = {
 }
 
 
-def make_app(preset: str, bus: str | None = None, feed: BusFeed | None = None) -> Starlette:
+def make_app(
+    preset: str, model: Path | None = None, bus: str | None = None, feed: BusFeed | None = None
+) -> Starlette:
     """The application: page, data, and the feed of a bus.
 
-    The preset is a name or a path, and the first that the page shows. Raises InputError for one
-    that cannot be loaded.
+    The preset is a name or a path, and the first that the page shows. Raises InputError or
+    ModelMismatchError as load_pair.
     """
-    config = config_data(bus, load_preset(preset).name)
-    places = {name: name for name in config["presets"]} | {config["presets"][0]: preset}
-    data = _Data(config, places)
-    threading.Thread(target=data.prepare, args=(config["presets"][0],), daemon=True).start()
+    chosen, _ = load_pair(preset, model)
+    config = config_data(bus, chosen.name)
+    makers: dict[str, Maker] = {"config": lambda: config, "database": database_data}
+    for name in config["presets"]:
+        place, of_it = (preset, model) if name == chosen.name else (name, None)
+        makers[name] = partial(preset_data, place, of_it)
+        makers[f"{name}.rows"] = partial(rows_data, place)
+    data = _Data(makers)
+    threading.Thread(target=data.prepare, args=(chosen.name,), daemon=True).start()
 
     async def websocket(socket: WebSocket) -> None:
         await _feed(socket, feed)
@@ -81,14 +92,8 @@ def make_app(preset: str, bus: str | None = None, feed: BusFeed | None = None) -
 class _Data:
     """JSON by name, made when it is asked for first."""
 
-    def __init__(self, config: Mapping[str, Any], places: Mapping[str, str]) -> None:
-        self._makers: dict[str, Callable[[], object]] = {
-            "config": lambda: config,
-            "database": database_data,
-        }
-        for name, place in places.items():
-            self._makers[name] = _later(preset_data, place)
-            self._makers[f"{name}.rows"] = _later(rows_data, place)
+    def __init__(self, makers: Mapping[str, Maker]) -> None:
+        self._makers = makers
         self._made: dict[str, str] = {}
         self._lock = threading.Lock()
 
@@ -110,10 +115,6 @@ class _Data:
             if name not in self._made:
                 self._made[name] = json.dumps(self._makers[name]())
             return self._made[name]
-
-
-def _later(make: Callable[[str], object], place: str) -> Callable[[], object]:
-    return lambda: make(place)
 
 
 class _SafeHeaders:

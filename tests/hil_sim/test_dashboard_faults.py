@@ -12,13 +12,7 @@ from tests.hil_sim.dashboard_page import browser, dashboard, needs_browser
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
-RANDOM = {"bus-flood", "sensor-jumping"}
-"""The page has random numbers of its own for them; their runs replay, but are others."""
-ROWS = {
-    row.fault.kind: row
-    for row in reversed(load_matrix())
-    if not row.realtime and row.fault.kind not in RANDOM
-}
+ROWS = {row.fault.kind: row for row in reversed(load_matrix()) if not row.realtime}
 PLAY = """async (name) => {
   const get = async (path) => (await fetch(path)).json();
   const [database, preset, rows] = await Promise.all(

@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from bms.errors import BusError, InputError
+from bms.model.model_file import shipped_model_path
 from hil_sim.bus.buses import Frame
 from hil_sim.bus.foreign import ForeignFrame
 from hil_sim.dashboard import build as page_build
@@ -175,6 +176,7 @@ def test_malformed_frames_are_counted_and_a_lost_bus_is_told(monkeypatch):
         (("--bus", "virtual:bms"), "one process only"),
         (("--bus", "socketcan:not_there9"), "cannot be opened"),
         (("--preset", "nothing"), "nothing"),
+        (("--preset", "lin2014", "--model", shipped_model_path("paper_calibrated")), "trained for"),
         (("--port", "70000"), "--port"),
         (("--for-s", "0"), "--for-s"),
     ],

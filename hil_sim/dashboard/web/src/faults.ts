@@ -1,8 +1,9 @@
-// Faults of a run, as hil_sim/faults. What is random there is random here too, by other numbers.
+// Faults of a run, as hil_sim/faults.
 
 import { counterOf, withCounter, withSignal, type Codecs, type Frame } from "./codec";
 import type { FaultData } from "./data";
 import type { Truth } from "./native";
+import type { FaultRandom } from "./random";
 
 export const SENSORS = [
   "current_A",
@@ -15,17 +16,7 @@ export const SENSORS = [
 const CELSIUS_OFFSET_K = 273.15;
 const SYNC = "SYNC";
 const HIGHEST_ID = 0x7ff;
-
-/** Random numbers from 0 to below 1 that a seed determines. Source: T. Ettinger, Mulberry32. */
-export function randomNumbers(seed: number): () => number {
-  let state = seed >>> 0;
-  return () => {
-    state = (state + 0x6d2b79f5) >>> 0;
-    let mixed = Math.imul(state ^ (state >>> 15), state | 1);
-    mixed ^= mixed + Math.imul(mixed ^ (mixed >>> 7), mixed | 61);
-    return ((mixed ^ (mixed >>> 14)) >>> 0) / 2 ** 32;
-  };
-}
+const MOST_DATA = 8;
 
 /** One fault of a run, from a period of the charge on. */
 export class Fault {
@@ -33,17 +24,14 @@ export class Fault {
   private kept: Frame[] = [];
   private lastHealthy = NaN;
   private age_s = 0;
-  private readonly random: () => number;
 
   constructor(
     readonly data: FaultData,
     readonly onset: number,
     private readonly codecs: Codecs,
     private readonly period_s: number,
-    seed: number,
-  ) {
-    this.random = randomNumbers(seed + 1);
-  }
+    private readonly random: FaultRandom,
+  ) {}
 
   /** Periods that it lasts. */
   get length(): number {
@@ -117,7 +105,7 @@ export class Fault {
       case "sensor-out-of-range":
         return this.number("value");
       case "sensor-jumping":
-        return healthy + this.number("amplitude") * (this.random() < 0.5 ? -1 : 1);
+        return healthy + this.number("amplitude") * (this.random.below(2) === 0 ? -1 : 1);
       case "sensor-unit-swapped":
         return this.text("sensor").endsWith("_K") ? healthy - CELSIUS_OFFSET_K : 1000 * healthy;
       case "sensor-not-available":
@@ -214,11 +202,13 @@ export class Fault {
   private flooded(frames: Frame[]): Frame[] {
     const known = this.codecs.byId;
     const free = Array.from({ length: HIGHEST_ID + 1 }, (_, id) => id).filter((id) => !known.has(id));
-    const pick = (count: number) => Math.floor(this.random() * count);
     const count = Number(this.data["frames_per_period"] ?? 400);
-    const foreign = Array.from({ length: count }, () => ({
-      id: free[pick(free.length)]!,
-      data: Uint8Array.from({ length: pick(9) }, () => pick(256)),
+    const ids = Array.from({ length: count }, () => free[this.random.below(free.length)]!);
+    const lengths = ids.map(() => this.random.below(MOST_DATA + 1));
+    const noise = this.random.bytes(MOST_DATA * count);
+    const foreign = ids.map((id, i) => ({
+      id,
+      data: noise.slice(MOST_DATA * i, MOST_DATA * i + lengths[i]!),
     }));
     if (this.data["position"] === "before") {
       return [...foreign, ...frames];

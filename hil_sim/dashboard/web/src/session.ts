@@ -7,6 +7,7 @@ import { decode, type Codecs, type Frame, type Values } from "./codec";
 import type { Message, PresetData, Row } from "./data";
 import { Fault, SENSORS } from "./faults";
 import type { Native, Start, Truth } from "./native";
+import { FaultRandom } from "./random";
 import { Traffic } from "./traffic";
 import { Trial, type Period, type Verdict } from "./verdict";
 
@@ -208,7 +209,8 @@ export class Session {
       (this.current_A < 0 || onset >= one.onset + LONGEST_WAIT_PERIODS);
     for (const { row } of this.planned.filter(isDue)) {
       const { period_s } = this.preset;
-      const fault = new Fault(row.fault, onset, this.codecs, period_s, this.start.seed);
+      const random = new FaultRandom(this.start.seed, this.faults.length);
+      const fault = new Fault(row.fault, onset, this.codecs, period_s, random);
       this.faults.push(fault);
       const { faults } = this.codecs.database;
       const trial = new Trial(row, onset, fault.length, this.preset, faults);
