@@ -126,20 +126,26 @@ PAGE(told) const void *told(void)
     return session.reception.has_told ? session.reception.told : NULL;
 }
 
-PAGE(look) const void *look(void)
+static const void *told_of(const cell_state_t *state, const cell_peaks_t *peaks, double voltage_V,
+                           double current_A, double cooling_power_W)
 {
-    const cell_state_t *state = &session.memory.state;
     truth = (page_truth_t){
         .soc = state->soc,
         .core_temperature_K = state->core,
         .surface_temperature_K = state->surface,
         .coolant_temperature_K = state->coolant,
-        .voltage_V = session_voltage_V(&session),
-        .current_A = session.current_A,
-        .cooling_power_W = session_cooling_power_W(&session),
-        .peaks = session.peaks,
+        .voltage_V = voltage_V,
+        .current_A = current_A,
+        .cooling_power_W = cooling_power_W,
+        .peaks = *peaks,
     };
     return &truth;
+}
+
+PAGE(look) const void *look(void)
+{
+    return told_of(&session.memory.state, &session.peaks, session_voltage_V(&session),
+                   session.current_A, session_cooling_power_W(&session));
 }
 
 PAGE(begin_beside) void begin_beside(void)
@@ -171,16 +177,7 @@ PAGE(advance_beside) uint32_t advance_beside(void)
 
 PAGE(look_beside) const void *look_beside(void)
 {
-    const cell_state_t *state = &beside.memory.state;
-    truth = (page_truth_t){
-        .soc = state->soc,
-        .core_temperature_K = state->core,
-        .surface_temperature_K = state->surface,
-        .coolant_temperature_K = state->coolant,
-        .voltage_V = cell_terminal_voltage_V(&beside.cell, &beside.memory, beside.current_A),
-        .current_A = beside.current_A,
-        .cooling_power_W = beside.cooling_power_W,
-        .peaks = beside.peaks.cell,
-    };
-    return &truth;
+    return told_of(&beside.memory.state, &beside.peaks.cell,
+                   cell_terminal_voltage_V(&beside.cell, &beside.memory, beside.current_A),
+                   beside.current_A, beside.cooling_power_W);
 }
