@@ -10,7 +10,7 @@ for source in firmware_c/src/*.c firmware_c/generated/*.c firmware_c/image/*.c f
   firmware_c/host/*.c "$native"/*.c "$runner"/*.c "$rivals"/*.c "$programs"/*.c; do
   ${CC:-cc} $flags $includes -I"$native" -I"$runner" -I"$rivals" -I"$programs" "$source"
 done
-for source in firmware_c/port/linux/*.c; do # the operating system's own interface is beyond C99
+for source in firmware_c/port/linux/*.c hil_sim/bus/*.c; do # the operating system's own interface is beyond C99
   ${CC:-cc} $flags -D_DEFAULT_SOURCE $includes "$source"
 done
 if command -v arm-none-eabi-gcc >/dev/null; then

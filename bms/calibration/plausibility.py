@@ -43,9 +43,11 @@ _VOLTAGE_HEADROOM_V = 0.6
 # Current against the last command, which the charger answers a period later: this share of the
 # strongest current is 1 A of 23 A. It is at least twice the step by which a growing current is
 # behind (0.5 A: 5 A/s for 0.1 s), and twenty times the reading's error; a faster fall is over
-# before the three periods that the fault takes. The firmware takes no more than 300 A.
+# before the three periods that the fault takes. A ramp so steep that a quarter of the strongest
+# current would pass for it is refused. The firmware takes no more than 300 A.
 _CURRENT_SHARE = 1.0 / 23.0
 _GROWTH_STEPS = 2.0
+_GROWTH_SHARE = 0.25
 _CURRENT_ERRORS = 20.0
 _LARGEST_DEVIATION_A = 300.0
 
@@ -79,7 +81,8 @@ def plausibility_fields(preset: Preset) -> dict[str, Any]:
     """Content of the calibration's plausibility_t as nested mapping, in the units of its names.
 
     Raises InputError when a reading that is not believed would not fit its CAN signal, which would
-    carry the end of its range instead, a reading that is.
+    carry the end of its range instead, a reading that is, and when the current may grow so fast
+    that what the charger does cannot be told from what it was told.
     """
     strongest_A = -_CURRENT_RANGE_FACTOR * preset.limits.reference_current_A
     ranges = {
@@ -133,8 +136,17 @@ def _cooling_range_W(preset: Preset) -> tuple[float, float]:
 def _current_deviation_A(preset: Preset, error_A: float) -> float:
     limits = preset.limits
     strongest_A = -limits.reference_current_A
-    step_A = min(limits.current_growth_A_per_s * preset.timing.sampling_period_s, strongest_A)
-    wanted_A = max(_CURRENT_SHARE * strongest_A, _GROWTH_STEPS * step_A, _CURRENT_ERRORS * error_A)
+    period_s = preset.timing.sampling_period_s
+    growth_A = _GROWTH_STEPS * limits.current_growth_A_per_s * period_s
+    most_A = _GROWTH_SHARE * strongest_A
+    if growth_A > most_A:
+        raise InputError(
+            f"preset '{preset.name}': limits.current_growth_A_per_s: "
+            f"{limits.current_growth_A_per_s:.10g} grows so fast that a wrong current would pass "
+            f"for it; at most {most_A / (_GROWTH_STEPS * period_s):.10g}, an eighth of "
+            "limits.reference_current_A in each timing.sampling_period_s"
+        )
+    wanted_A = max(_CURRENT_SHARE * strongest_A, growth_A, _CURRENT_ERRORS * error_A)
     return min(wanted_A, _LARGEST_DEVIATION_A)
 
 

@@ -1,4 +1,4 @@
-"""`bms compare-estimators`: the network beside Kalman filters, a perceptron and linear maps."""
+"""`bms compare-estimators`: the network beside filters, a perceptron and polynomials."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ from typing import Annotated, Any
 import typer
 
 from bms.commands import options
+from bms.data.cooling import Cooling
 from bms.data.measurements import recording_sha256
 from bms.errors import InputError
 from bms.files import make_folder, write_text
 from bms.kan.network import INPUT_NAMES
+from bms.kan.settings import PRESET_LAGS_S, TrainingSettings
 from bms.model.model_file import load_model, load_shipped_model, shipped_model_path
 from bms.presets import Preset, load_preset
 from bms.studies.rivals.chart import save_chart
@@ -23,6 +25,7 @@ from bms.studies.rivals.effort import FULL, QUICK
 from bms.studies.rivals.lagged import all_lags
 from bms.studies.rivals.recorded import recorded_problem
 from bms.studies.rivals.simulated import simulated_problem
+from bms.studies.rivals.trained import trained_on
 from bms.studies.rivals.verdict import verdict
 from bms.text_table import TextTable
 from bms.waiting import waiting
@@ -49,6 +52,14 @@ def compare_estimators(
         int | None,
         typer.Option("--profiles", min=1, help="With --preset: profiles of each kind and split."),
     ] = None,
+    cooling: Annotated[
+        Cooling,
+        typer.Option(
+            "--cooling",
+            help="With --preset, how the plant's surface is cooled; but for linear, networks are "
+            "trained on that plant first.",
+        ),
+    ] = Cooling.LINEAR,
     seed: Annotated[
         int | None, options.seed_option("data and fits", "that of the training")
     ] = None,
@@ -62,35 +73,33 @@ def compare_estimators(
 ) -> None:
     """Compare the KAN with its rivals: error (K), size, work and time of an estimate in float32 C.
 
-    The rivals are Kalman filters that know the cell, a perceptron of the KAN's size and linear
-    maps; the floor is what a large map of the same four inputs reaches. With --preset the data are
-    whole profiles that no training has seen; with --data the last third of a recording.
+    The rivals are Kalman filters that know the cell, a perceptron of the KAN's size, linear and
+    quadratic maps; the floor is what a large map of the same four inputs reaches. With --preset the
+    data are whole profiles that no training has seen, from a plant like the cell model or, by
+    --cooling, one that it does not describe; with --data the last third of a recording.
 
     Example: bms compare-estimators --preset paper_calibrated --out out/estimators
     """
-    if (preset is None) == (data is None):
-        raise InputError("compare-estimators: give either --preset NAME or --data CSV")
-    if preset is None and profiles is not None:
-        raise InputError("compare-estimators: --profiles belongs to --preset; leave it out")
-    if data is None and cell is not None:
-        raise InputError(
-            "compare-estimators: --cell belongs to --data; with --preset filters get the true cell"
-        )
+    _require_one_source(preset, data, cell, profiles, cooling, has_models=bool(model))
     chosen = load_preset(preset or cell or DEFAULT_CELL)
-    models = _models(chosen if data is None else None, model or [])
-    warnings = _warnings(models, data, chosen)
+    if out is not None:
+        make_folder(out)
+    models, warnings = [], []
+    if cooling is not Cooling.LINEAR:
+        models = _trained(chosen, cooling, seed or 0, profiles)
+    else:
+        models = _models(chosen if data is None else None, model or [])
+        warnings = _warnings(models, data, chosen)
     lags = all_lags(network.model.network for network in models)
     of_models = models[0].model.training.settings.seed if models else 0
     used_seed = of_models if seed is None else seed
-    if out is not None:
-        make_folder(out)
     with waiting("comparing", 1 + len(models) + KINDS, "parts") as wait:
         if data is not None:
             wait.begin("cell and noise of the recording")
             problem = recorded_problem(data, chosen, cell is None, lags)
         else:
             wait.begin("simulating profiles")
-            problem = simulated_problem(chosen, used_seed, lags, profiles)
+            problem = simulated_problem(chosen, used_seed, lags, profiles, cooling)
         effort = QUICK if quick else FULL
         comparison = run_comparison(
             problem, models, used_seed, time.perf_counter_ns, effort, wait.begin
@@ -115,6 +124,47 @@ def compare_estimators(
         typer.echo("\n".join(sentences))
     for warning in warnings:
         typer.echo(f"warning: {warning}", err=True)
+
+
+def _require_one_source(
+    preset: str | None,
+    data: Path | None,
+    cell: str | None,
+    profiles: int | None,
+    cooling: Cooling,
+    *,
+    has_models: bool,
+) -> None:
+    if (preset is None) == (data is None):
+        raise InputError("compare-estimators: give either --preset NAME or --data CSV")
+    if preset is None and profiles is not None:
+        raise InputError("compare-estimators: --profiles belongs to --preset; leave it out")
+    if data is None and cell is not None:
+        raise InputError(
+            "compare-estimators: --cell belongs to --data; with --preset filters get the true cell"
+        )
+    is_trained_here = cooling is not Cooling.LINEAR
+    if data is not None and is_trained_here:
+        raise InputError("compare-estimators: --cooling belongs to --preset; leave it out")
+    if has_models and is_trained_here:
+        raise InputError(
+            f"compare-estimators: --model was trained on another plant than --cooling "
+            f"{cooling.value}, for which networks are trained anew; leave one of them out"
+        )
+
+
+def _trained(preset: Preset, cooling: Cooling, seed: int, profiles: int | None) -> list[NamedModel]:
+    """A network of the paper's kind and a lagged one."""
+    models = []
+    for name, lags_s in (("KAN", ()), ("lagged KAN", PRESET_LAGS_S)):
+        settings = TrainingSettings(
+            width=(len(INPUT_NAMES) + 2 * len(lags_s), 1, 1), seed=seed, lag_time_constants_s=lags_s
+        )
+        with waiting(f"training the {name}") as wait:
+            models.append(
+                NamedModel(name, trained_on(preset, cooling, settings, profiles, wait.reach))
+            )
+    return models
 
 
 def _models(preset: Preset | None, paths: list[Path]) -> list[NamedModel]:

@@ -11,7 +11,7 @@ import typer
 from bms.commands import options
 from bms.errors import InputError
 from bms.kan.network import INPUT_NAMES
-from bms.kan.settings import TrainingSettings
+from bms.kan.settings import PRESET_LAGS_S, TrainingSettings
 from bms.model.make import model_for_measurements, model_for_preset
 from bms.model.model_file import KanModel, save_model
 from bms.presets import load_preset
@@ -21,7 +21,6 @@ from bms.waiting import waiting
 
 DEFAULTS = TrainingSettings()
 _LIST_EXAMPLE = "4,1,1"
-_LAGS_OF_PRESETS_S = (3.0,)
 _LAGS_OF_RECORDINGS_S = (10.0, 160.0)
 
 
@@ -71,7 +70,7 @@ def train(
             "--lag-time-constants", lag_time_constants_s, float, _LIST_EXAMPLE
         )
     elif lagged:
-        constants_s = list(_LAGS_OF_PRESETS_S if data is None else _LAGS_OF_RECORDINGS_S)
+        constants_s = list(PRESET_LAGS_S if data is None else _LAGS_OF_RECORDINGS_S)
     inputs = len(INPUT_NAMES) + 2 * len(constants_s)
     nodes = [inputs, 1, 1]
     if width is not None:

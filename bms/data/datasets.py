@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from bms.data.cooling import Cooling
 from bms.data.lags import Lags
 from bms.data.profiles import KINDS, Kind, draw_profiles
 from bms.data.simulate import Samples, simulate
@@ -26,7 +27,12 @@ PROFILES_OF_EACH_KIND: dict[Split, int] = {
 
 
 def simulated_split(
-    preset: Preset, split: Split, seed: int, count: int | None = None, lags: Lags = ()
+    preset: Preset,
+    split: Split,
+    seed: int,
+    count: int | None = None,
+    lags: Lags = (),
+    cooling: Cooling = Cooling.LINEAR,
 ) -> dict[Kind, Samples]:
     """Constant and dynamic profiles of one split, `count` of each kind (None: as shipped).
 
@@ -37,7 +43,7 @@ def simulated_split(
     profiles = PROFILES_OF_EACH_KIND[split] if count is None else count
     rng = np.random.default_rng([seed, _SPLITS.index(split)])
     return {
-        kind: simulate(preset, draw_profiles(preset, kind, profiles, rng), rng, lags)
+        kind: simulate(preset, draw_profiles(preset, kind, profiles, rng), rng, lags, cooling)
         for kind in KINDS
     }
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from bms.arrays import Array, IntArray
 from bms.cell import CellParameters, CellState, Disturbance, integrate_step
+from bms.data.cooling import Cooling
 from bms.data.lags import Lags, at_rest, step
 from bms.data.profiles import SAMPLE_PERIOD_S, Profiles
 from bms.presets import Preset
@@ -54,7 +55,11 @@ def joined(parts: Iterable[Samples]) -> Samples:
 
 
 def simulate(
-    preset: Preset, profiles: Profiles, rng: np.random.Generator, lags: Lags = ()
+    preset: Preset,
+    profiles: Profiles,
+    rng: np.random.Generator,
+    lags: Lags = (),
+    cooling: Cooling = Cooling.LINEAR,
 ) -> Samples:
     """Samples of every profile from its first step until the cell is full or leaves the box.
 
@@ -90,13 +95,19 @@ def simulate(
         noise = PROCESS_NOISE_K_PER_S * rng.standard_normal((3, len(start_K)))
         for _ in range(_STEPS_PER_SAMPLE):
             before_K = state.surface_temperature_K
+            excess_W = cooling.excess_W(cell, state)
             state = integrate_step(
                 cell,
                 state,
                 current_A,
                 profiles.cooling_power_W,
                 _STEP_S,
-                Disturbance(0.0, *noise),
+                Disturbance(
+                    0.0,
+                    noise[0],
+                    noise[1] - excess_W / cell.surface_heat_capacity_J_per_K,
+                    noise[2] + excess_W / cell.coolant_heat_capacity_J_per_K,
+                ),
             )
             filtered = step(
                 lags, filtered, _STEP_S, current_A, state.surface_temperature_K - before_K

@@ -14,12 +14,12 @@ _ERASED_WORD = 0xFFFF_FFFF
 def floor_of(flash: bytes) -> int:
     """The oldest version that this flash takes; 0 where it takes any.
 
-    Raises ValueError for a record that is damaged.
+    Raises ValueError for a record that is damaged or cut off.
     """
     start = MEMORY_MAP.floor.address
     record = flash[start : start + FLOOR_LENGTH]
     if len(record) < FLOOR_LENGTH:
-        return 0
+        raise ValueError(f"there are {len(flash)} bytes, and it stands behind byte {start}")
     version, inverted = _RECORD.unpack(record)
     if version == inverted == _ERASED_WORD:
         return 0

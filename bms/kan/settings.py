@@ -11,6 +11,9 @@ from bms.data.lags import Lag, Lags
 from bms.errors import InputError
 from bms.validation import Count, NonNegative, Positive, strict
 
+PRESET_LAGS_S = (3.0,)
+"""Time constants of a lagged network that is trained on simulated data."""
+
 
 @strict
 @dataclass(frozen=True)

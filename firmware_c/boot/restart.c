@@ -13,12 +13,10 @@ void restart_begin(restart_record_t *record)
     if (record->check != check_of(record)) {
         *record = (restart_record_t){ .cause = RESTART_POWER_ON };
     } else {
-        const uint32_t noted = (record->noted == RESTART_FAULT || record->noted == RESTART_WATCHDOG)
-                                   ? record->noted
-                                   : (uint32_t)RESTART_OTHER;
-        const uint32_t before = (noted == record->cause) ? record->count : 0u;
-        record->cause = noted;
-        record->count = (before < MOST_COUNTED) ? (before + 1u) : MOST_COUNTED;
+        record->cause = (record->noted == RESTART_FAULT || record->noted == RESTART_WATCHDOG)
+                            ? record->noted
+                            : (uint32_t)RESTART_OTHER;
+        record->count = (record->count < MOST_COUNTED) ? (record->count + 1u) : MOST_COUNTED;
     }
     record->noted = RESTART_OTHER;
     record->check = check_of(record);

@@ -1,7 +1,7 @@
 /* Why the processor starts: a record in memory that outlasts a reset, but not the power.
  *
- * Whoever resets on purpose notes the cause first; the boot stage counts starts with the same cause
- * in a row and, after a few, starts nothing until another cause comes: power, or the reset line. The
+ * Whoever resets on purpose notes the cause first; the boot stage counts the starts since the power
+ * came, whatever their causes, and after a few starts nothing until the power comes anew. The
  * application ends the row by running for long enough.
  */
 #ifndef RESTART_H
@@ -14,7 +14,7 @@
 extern "C" {
 #endif
 
-/* Starts with the same cause in a row with which the boot stage starts the application no more. */
+/* Starts in a row, without the power, with which the boot stage starts the application no more. */
 #define RESTART_MOST 3u
 
 /* An application that has run for so long is one that runs. */
@@ -31,7 +31,7 @@ typedef enum {
 typedef struct {
     uint32_t noted; /* restart_cause_t of the next start */
     uint32_t cause; /* of this start */
-    uint32_t count; /* starts with this cause in a row, this one included; 0 after power came */
+    uint32_t count; /* starts in a row, this one included; 0 after power came */
     uint32_t check; /* over cause and count: what power left behind is no record */
 } restart_record_t;
 
@@ -41,7 +41,7 @@ void restart_begin(restart_record_t *record);
 /* Whether it is time to give up. */
 bool restart_is_hopeless(const restart_record_t *record);
 
-/* Ends the row: the next start counts as the first with its cause. */
+/* Ends the row: the next start counts as the first. */
 void restart_forgive(restart_record_t *record);
 
 #ifdef __cplusplus

@@ -1020,7 +1020,7 @@ struct can_db_start_t {
     uint8_t reset_cause;
 
     /**
-     * Starts with this cause in a row, 0 after power came; 253 means 253 or more.
+     * Starts in a row of which none ran for a minute, this one included; 0 after power came; 253 means 253 or more.
      *
      * Range: 0..253 (0..253 -)
      * Scale: 1

@@ -47,7 +47,7 @@ typedef struct {
 typedef struct {
     uint32_t calibration_content; /* first 32 bits of the SHA-256 of the calibration's bytes */
     uint8_t reset_cause;          /* ResetCause of the database */
-    uint8_t reset_count;          /* starts with that cause in a row */
+    uint8_t reset_count;          /* starts in a row */
 } bms_start_t;
 
 typedef struct {

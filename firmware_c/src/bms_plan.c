@@ -50,6 +50,7 @@ static void describe_family(const bms_t *bms, planner_start_t *start)
     if (asked_mode(bms) == MODE_BY_TIME) {
         /* In time is what even the least full of the largest cells is. */
         start->soc = family->soc_low.soc;
+        start->total_ohm = start->resistance_ohm;
         return;
     }
     start->soc = numeric_larger(

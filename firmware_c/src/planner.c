@@ -204,7 +204,8 @@ void planner_begin(planner_t *planner)
     planner->high_A = MOST_SHARE * strongest_A;
     if (planned_A > planner->low_A) {
         /* The time has more than one least: what is in force stays until something beats it. */
-        planner->low_A = numeric_larger(planner->low_A, planned_A / NEAR);
+        planner->low_A = numeric_larger(planner->low_A,
+                                        numeric_smaller(planned_A, strongest_A) / NEAR);
         planner->high_A = numeric_smaller(planner->high_A, planned_A * NEAR);
         begin_prediction(planner, IN_FORCE, planned_A);
     } else {

@@ -71,6 +71,13 @@ guest() {
 
 # --- host ----------------------------------------------------------------------------------------
 
+# Nothing, or what has to be loaded with a kernel that knows no processor like this one.
+preloaded() {
+    grep -q -w amx_tile /proc/cpuinfo || return 0
+    cc -O2 -shared -fPIC -o "$1/ptrace.so" "${BASH_SOURCE[0]%/*}/vcan_guest_ptrace.c" || return
+    printf '%s' "$1/ptrace.so"
+}
+
 write_command() {
     # Variables that belong to this shell or this kernel stay outside.
     export -p | grep -v -E '^declare -x (OLDPWD|PWD|SHLVL|_|VCAN_JOB)='
@@ -101,7 +108,9 @@ host() {
     # A copy, because a path with a blank in it cannot be given to the kernel.
     cp "${BASH_SOURCE[0]}" "$job/init" && chmod +x "$job/init"
 
-    timeout -k 5 "${VCAN_TIMEOUT_S:-300}" "$KERNEL" \
+    local preload
+    preload=$(preloaded "$job") || fail 69 'this processor needs the command cc; run: apt-get install -y gcc libc6-dev'
+    LD_PRELOAD=$preload timeout -k 5 "${VCAN_TIMEOUT_S:-300}" "$KERNEL" \
         mem="${VCAN_MEMORY:-1G}" rootfstype=hostfs rootflags=/ rw init="$job/init" \
         VCAN_JOB="$job" umid="${job##*/}" uml_dir="$job/" con=null ssl=null quiet \
         < /dev/null > "$job/boot" 2>&1 &

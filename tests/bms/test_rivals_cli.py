@@ -159,6 +159,22 @@ def test_without_scikit_learn_the_floor_says_why_it_is_missing(bms, monkeypatch,
     assert floor["remark"].startswith("not run: scikit-learn is not installed")
 
 
+def test_networks_are_trained_on_a_plant_that_no_preset_describes(bms):
+    """The filters, which go by the cell's own law of cooling, know nothing of it."""
+    arguments = ("compare-estimators", "--preset", DEFAULT_PRESET, *QUICK, "--json")
+    code, out, err = bms(*arguments, "--cooling", "free-convection")
+
+    result = json.loads(out)
+    assert (code, result["warnings"]) == (0, [])
+    assert "warning" not in err
+    assert "free-convection" in result["data"]
+    assert [row["name"] for row in result["estimators"]][:2] == ["KAN", "lagged KAN"]
+    quadratic = by_name(result, "quadratic least squares (lagged inputs)")
+    ignorant = by_name(result, "steady gain")
+    assert ignorant["given"] == "the cell, its cooling linear"
+    assert ignorant["errors"]["all"]["rmse_K"] > 0.05 > quadratic["errors"]["all"]["rmse_K"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
@@ -167,6 +183,12 @@ def test_without_scikit_learn_the_floor_says_why_it_is_missing(bms, monkeypatch,
         (["--data", "x.csv"], "x.csv"),
         (["--data", "x.csv", "--profiles", "3"], "--profiles belongs to --preset"),
         (["--preset", "lin2014", "--cell", "lin2014"], "--cell belongs to --data"),
+        (["--data", "x.csv", "--cooling", "free-convection"], "--cooling belongs to --preset"),
+        (
+            ["--preset", "lin2014", "--cooling", "free-convection", "--model", "x.json"],
+            "--model was trained on another plant",
+        ),
+        (["--preset", "lin2014", "--cooling", "none"], "'linear', 'free-convection'"),
         (["--preset", "nonsense"], "nonsense"),
         (["--preset", "lin2014", "--model", "absent.json"], "absent.json"),
     ],

@@ -12,7 +12,7 @@ from bms.data.simulate import Samples, joined
 from bms.studies.rivals.effort import Effort
 from bms.studies.rivals.estimator import BASE_COLUMNS, Sequences
 from bms.studies.rivals.floor import static_floor
-from bms.studies.rivals.linear import LinearEstimator
+from bms.studies.rivals.linear import LinearEstimator, QuadraticEstimator
 from bms.studies.rivals.perceptron import Perceptron, PerceptronEstimator, hidden_nodes
 from bms.studies.rivals.timing import REPEATS, time_per_estimate_ns
 from tests.bms.rival_samples import charge
@@ -70,6 +70,34 @@ def test_linear_map_of_a_channel_that_does_not_vary_stays_small(samples):
 
     changed_K = estimate(estimator, dataclasses.replace(still, inputs=moved))
     assert np.abs(changed_K - estimate(estimator, still)).max() < FLOAT32_K
+
+
+def test_quadratic_map_finds_a_quadratic_truth_and_pays_for_every_product(samples):
+    centered = samples.inputs[:, :4] - samples.inputs[:, :4].mean(axis=0)
+    slope_K = np.array([0.05, -0.8, 0.9, 0.1])
+    curve_K = np.array([[4e-3, 0.02, 0, 1e-3], [0, 0.3, 0.01, 0], [0, 0, 2e-3, 0], [0, 0, 0, 1e-3]])
+    core_K = 300.0 + centered @ slope_K + np.einsum("ni,ij,nj->n", centered, curve_K, centered)
+    truth = dataclasses.replace(samples, core_temperature_K=core_K)
+
+    estimator = QuadraticEstimator("quadratic", truth, BASE_COLUMNS, ())
+
+    assert np.abs(estimate(estimator, truth) - core_K).max() < FLOAT32_K
+    linear = LinearEstimator("linear", truth, BASE_COLUMNS, ())
+    assert np.abs(estimate(linear, truth) - core_K).max() > 10 * FLOAT32_K
+    assert estimator.cost.parameters == 1 + 4 + 10
+    assert estimator.cost.bytes == 4 * (4 + 4 + 10 + 1)
+    assert estimator.cost.multiply_adds == 4 + 10
+
+
+def test_quadratic_map_of_a_channel_that_does_not_vary_is_that_of_the_others(samples):
+    still = samples.inputs.copy()
+    still[:, 1] = 0.2
+    still = dataclasses.replace(samples, inputs=still)
+
+    estimator = QuadraticEstimator("quadratic", still, BASE_COLUMNS, ())
+    others = QuadraticEstimator("quadratic", still, (0, 2, 3), ())
+
+    assert np.abs(estimate(estimator, still) - estimate(others, still)).max() < FLOAT32_K
 
 
 def test_perceptron_in_c_sums_and_squashes_as_scikit_learn_does(samples):

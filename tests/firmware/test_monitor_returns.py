@@ -44,11 +44,12 @@ def spread(count: int, over: int) -> list[int]:
     return [round(i * over / (count - 1)) for i in range(count)]
 
 
-def test_over_voltage_over_temperature_the_domain_and_damaged_frames_do_not_come_and_go(
+def test_currents_of_no_charger_the_domain_what_is_over_a_limit_and_damaged_frames_do_not_return(
     native: Native,
 ) -> None:
     lib = native[1]
     assert returning(native) == [
+        lib.FAULT_CURRENT_RANGE,
         lib.FAULT_OUT_OF_DOMAIN,
         lib.FAULT_OVER_VOLTAGE,
         lib.FAULT_CORE_OVER_TEMPERATURE,

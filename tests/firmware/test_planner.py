@@ -160,10 +160,10 @@ START: dict[str, Any] = {
 GOAL = {"strongest_A": 23.0, "time_left_s": -1.0}
 
 
-def begun(start: dict[str, Any], goal: dict[str, float]) -> Any:
+def begun(start: dict[str, Any], goal: dict[str, float], planned_A: float = 8.0) -> Any:
     planner = ffi.new("planner_t *")
     lib.planner_reset(planner)
-    planner.start, planner.goal, planner.planned_A = start, goal, 8.0
+    planner.start, planner.goal, planner.planned_A = start, goal, planned_A
     lib.planner_begin(planner)
     return planner
 
@@ -176,6 +176,14 @@ def test_readings_that_are_no_number_leave_no_plan(name: str, value: float) -> N
     planner = begun(start, {**GOAL, name: value} if name in GOAL else GOAL)
     assert not planner.is_searching
     assert math.isnan(planner.planned_A)
+
+
+@pytest.mark.parametrize("planned_A", [0.01, 0.2, 8.0, 23.0, math.nan])
+def test_a_search_is_among_currents_that_the_charger_asks_for(planned_A: float) -> None:
+    """Also when it has asked for much more until now."""
+    planner = begun(START, {**GOAL, "strongest_A": 8.0}, planned_A)
+    assert 0.0 < planner.low_A < 0.5 * planner.high_A
+    assert planner.low_A <= 0.5 * 8.0
 
 
 def test_a_period_takes_no_more_steps_than_it_may_and_a_search_ends() -> None:

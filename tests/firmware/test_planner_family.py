@@ -8,6 +8,7 @@ import pytest
 
 from bms.cell import CellFactors, scaled
 from bms.presets import load_preset
+from bms.presets.schema import Initial
 from hil_sim.bus.catalog import Mode
 from hil_sim.plant.true_cell import nominal_cell
 from hil_sim.run.result import RunResult
@@ -24,14 +25,24 @@ WRONGLY_PLUGGED_IN = (0.05, -0.05)
 
 
 def charge(
-    mode: Mode | None, full_by_s: float | None = None, told: float = 0.0, supply: float = 0.0
+    mode: Mode | None,
+    full_by_s: float | None = None,
+    told: float = 0.0,
+    supply: float = 0.0,
+    initial: Initial = HALF_FULL,
+    factors: CellFactors | None = None,
 ) -> RunResult:
-    """A half full cell; the charger says `told` more, and gives 1 + `supply` of what it is told."""
-    cell = nominal_cell(PRESET, HALF_FULL)
-    cell = replace(cell, plug_in_soc=cell.plug_in_soc + told, supply_tolerance=supply)
+    """The charger says `told` more than is there, and gives 1 + `supply` of what it is told."""
+    cell = nominal_cell(PRESET, initial)
+    cell = replace(
+        cell,
+        cell=scaled(cell.cell, factors or CellFactors()),
+        plug_in_soc=cell.plug_in_soc + told,
+        supply_tolerance=supply,
+    )
     settings = Settings(
         PRESET,
-        initial=HALF_FULL,
+        initial=initial,
         true_cell=cell,
         mode=mode,
         full_by_s=full_by_s,
@@ -45,6 +56,15 @@ def test_a_family_is_full_in_time_though_its_count_ends_early(told: float, suppl
     fastest_s = time_s(charge(None, None, told, supply))
     assert fastest_s < 0.5 * ASKED_S
     assert 0.8 * ASKED_S < time_s(charge(Mode.BY_TIME, ASKED_S, told, supply)) <= 1.01 * ASKED_S
+
+
+def test_a_cold_cell_that_resists_more_is_full_in_time() -> None:
+    """Its voltage limits it sooner than that of the family's own cell."""
+    initial = replace(PRESET.initial, temperature_K=283.0)
+    factors = CellFactors(resistance=1.6)
+    asked_s = 1.1 * time_s(charge(None, initial=initial, factors=factors))
+    in_time = charge(Mode.BY_TIME, asked_s, initial=initial, factors=factors)
+    assert 0.9 * asked_s < time_s(in_time) <= 1.01 * asked_s
 
 
 def test_the_fastest_charge_of_a_family_is_no_slower_than_the_fixed_one() -> None:

@@ -18,7 +18,7 @@ from bms.identification.preset_toml import preset_toml
 from bms.model.model_file import load_model, shipped_model_path
 from bms.model.pair import load_pair
 from bms.presets import load_preset
-from hil_sim.bus.catalog import FrameId
+from hil_sim.bus.catalog import FrameId, Mode
 from hil_sim.logs.recorder import Recorder
 from hil_sim.nodes.line_losses import LOSS_ID
 from hil_sim.run.session import run_both, run_on_clocks, run_plant, run_sil
@@ -66,7 +66,7 @@ def test_a_full_charge_over_the_serial_line_gives_the_frames_of_the_virtual_bus(
 def test_a_family_is_charged_with_the_same_frames_where_its_calibration_is_flashed(
     bms, board, tmp_path
 ):
-    """Hot and half full, so that the core's condition governs within the time."""
+    """Hot, half full and without a plan, so that the core's condition governs within the time."""
     preset, model = load_pair("a123_26650_10C", None)
     initial = replace(preset.initial, soc=0.5, temperature_K=313.0)
     path = tmp_path / "hot.toml"
@@ -81,7 +81,7 @@ def test_a_family_is_charged_with_the_same_frames_where_its_calibration_is_flash
     calibration = ("--calibration", tmp_path / "calibration.bin", "--no-start")
     code, _, err = bms("flash", "--target", f"qemu:{board}", *flash, *calibration)
     assert (code, err) == (0, "")
-    settings = Settings(load_preset(path), model=model, seed=SEED, max_time_s=60.0)
+    settings = Settings(load_preset(path), model=model, seed=SEED, mode=Mode.FIXED, max_time_s=60.0)
     with Recorder(tmp_path / "host.log") as recorder:
         run = run_both(settings, recorder)
     assert "core" in {*run.series.active_constraint}
@@ -192,7 +192,7 @@ def test_a_line_without_losses_passes(settings, bms):
 def test_an_ecu_that_does_not_name_its_model_does_not_charge(settings):
     with (
         Line(Serial(settings, silent_ids=(IDENTITY_ID,)).answer) as line,
-        pytest.raises(BusError, match=r"not ready after 100 periods .*model unknown"),
+        pytest.raises(BusError, match=r"not ready after 100 periods .*model or content unknown"),
     ):
         run_sil(replace(settings, bus=line.bus))
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from bms.arrays import Array
+from bms.data.lags import Lags
 from bms.kan.accuracy import ErrorFigures, error_figures
 from bms.model.model_file import KanModel
 from bms.studies.rivals.effort import FULL, Effort
@@ -15,12 +16,12 @@ from bms.studies.rivals.filters import ExtendedKalman, FullKalman, SteadyKalman
 from bms.studies.rivals.floor import FLOOR, static_floor
 from bms.studies.rivals.kan import KanEstimator, trained_parameters
 from bms.studies.rivals.lagged import columns_of
-from bms.studies.rivals.linear import LinearEstimator
+from bms.studies.rivals.linear import LinearEstimator, QuadraticEstimator
 from bms.studies.rivals.perceptron import PerceptronEstimator, hidden_nodes
 from bms.studies.rivals.problem import Problem
 from bms.studies.rivals.timing import Clock, time_per_estimate_ns
 
-Role = Literal["kan", "filter", "perceptron", "linear", "floor"]
+Role = Literal["kan", "filter", "perceptron", "polynomial", "floor"]
 
 KINDS = 4
 """Of estimators besides the models: filters, perceptron, linear maps, floor."""
@@ -125,12 +126,18 @@ def run_comparison(
         problem.before_validation, problem.validation, nodes, effort, seed
     )
     add("perceptron", perceptron)
-    note("linear maps")
-    add("linear", LinearEstimator("least squares", problem.training, BASE_COLUMNS, ()))
+    note("least squares")
+    every = range(problem.training.inputs.shape[1])
+    taken: dict[str, tuple[Sequence[int], Lags]] = {"": (BASE_COLUMNS, ())}
     if problem.lags:
-        every = range(problem.training.inputs.shape[1])
-        name = "least squares (lagged inputs)"
-        add("linear", LinearEstimator(name, problem.training, every, problem.lags))
+        taken[" (lagged inputs)"] = (every, problem.lags)
+    for what, (columns, lags) in taken.items():
+        linear = LinearEstimator(f"least squares{what}", problem.training, columns, lags)
+        add("polynomial", linear)
+        quadratic = QuadraticEstimator(
+            f"quadratic least squares{what}", problem.training, columns, lags
+        )
+        add("polynomial", quadratic)
     note("floor of static maps")
     try:
         add("floor", static_floor(perceptron, problem, effort, seed))

@@ -10,7 +10,7 @@ RIVALS = NativeExtension(
     folders=(_NATIVE,),
     headers=tuple(
         f"{_NATIVE}/{name}.h"
-        for name in ("linear", "mlp", "thermal", "covariance", "kalman", "rows")
+        for name in ("linear", "quadratic", "mlp", "thermal", "covariance", "kalman", "rows")
     ),
     libraries=("m",),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bms.data.cooling import Cooling
 from bms.data.datasets import simulated_split
 from bms.data.lags import Lags
 from bms.data.profiles import SAMPLE_PERIOD_S
@@ -20,15 +21,22 @@ _RESISTANCE_DRIFT_PER_SQRT_S = 1e-4
 _SENSOR_STREAM = 101
 
 
-def simulated_problem(preset: Preset, seed: int, lags: Lags, count: int | None = None) -> Problem:
+def simulated_problem(
+    preset: Preset,
+    seed: int,
+    lags: Lags,
+    count: int | None = None,
+    cooling: Cooling = Cooling.LINEAR,
+) -> Problem:
     """Whole profiles of the preset, `count` of each kind in each split (None: as shipped).
 
-    The filters are given the true cell, except that the extended one believes in a resistance a
+    With another law of cooling than the cell model's the filters know nothing of it. They are given
+    the true cell, except that the extended one believes in a resistance a
     fifth too high at first; uncertainties and sensors are those of the preset.
     """
-    training = joined(simulated_split(preset, "training", seed, count, lags).values())
-    validation = joined(simulated_split(preset, "validation", seed, count, lags).values())
-    kinds = simulated_split(preset, "evaluation", seed, count, lags)
+    training = joined(simulated_split(preset, "training", seed, count, lags, cooling).values())
+    validation = joined(simulated_split(preset, "validation", seed, count, lags, cooling).values())
+    kinds = simulated_split(preset, "evaluation", seed, count, lags, cooling)
     samples = joined(kinds.values())
     rng = np.random.default_rng([seed, _SENSOR_STREAM])
     test = Sequences.of(samples)
@@ -37,7 +45,7 @@ def simulated_problem(preset: Preset, seed: int, lags: Lags, count: int | None =
     first_dynamic = int(np.searchsorted(test.starts, constant_rows))
     bounds = preset.uncertainty
     return Problem(
-        title=f"preset {preset.name}, whole profiles that no training has seen",
+        title=_title(preset, cooling),
         training=training,
         before_validation=training,
         validation=validation,
@@ -49,7 +57,9 @@ def simulated_problem(preset: Preset, seed: int, lags: Lags, count: int | None =
         read=Sequences.of(as_read(preset.sensors, samples, lags, rng)),
         lags=lags,
         cell=preset.cell,
-        cell_origin="the true cell",
+        cell_origin="the true cell"
+        if cooling is Cooling.LINEAR
+        else "the cell as its model has it",
         noise=FilterNoise(
             core_K_per_s=bounds.core_K_per_s,
             surface_K_per_s=bounds.surface_K_per_s,
@@ -64,3 +74,8 @@ def simulated_problem(preset: Preset, seed: int, lags: Lags, count: int | None =
         trace_profile=first_dynamic + int(np.argmax(np.diff(test.starts[first_dynamic:]))),
         trace_title="the longest dynamic profile",
     )
+
+
+def _title(preset: Preset, cooling: Cooling) -> str:
+    plant = "" if cooling is Cooling.LINEAR else f" with {cooling.value}"
+    return f"preset {preset.name}{plant}, whole profiles that no training has seen"

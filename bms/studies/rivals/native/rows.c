@@ -7,6 +7,14 @@ void linear_rows(const linear_t *linear, const float *inputs, uint32_t rows, flo
     }
 }
 
+void quadratic_rows(const quadratic_t *quadratic, const float *inputs, uint32_t rows,
+                    float *core_K)
+{
+    for (uint32_t i = 0u; i < rows; i++) {
+        core_K[i] = quadratic_estimate_K(quadratic, &inputs[i * quadratic->inputs]);
+    }
+}
+
 void mlp_rows(const mlp_t *mlp, const float *inputs, uint32_t rows, float *core_K)
 {
     for (uint32_t i = 0u; i < rows; i++) {

@@ -9,8 +9,11 @@
 #include "kalman.h"
 #include "linear.h"
 #include "mlp.h"
+#include "quadratic.h"
 
 void linear_rows(const linear_t *linear, const float *inputs, uint32_t rows, float *core_K);
+void quadratic_rows(const quadratic_t *quadratic, const float *inputs, uint32_t rows,
+                    float *core_K);
 void mlp_rows(const mlp_t *mlp, const float *inputs, uint32_t rows, float *core_K);
 void steady_kalman_rows(const steady_kalman_t *kalman, const float *inputs,
                         const uint32_t *starts, uint32_t profiles, float *core_K);
