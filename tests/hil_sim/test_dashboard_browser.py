@@ -190,8 +190,8 @@ def test_a_bus_with_bms_plant_and_bms_ecu_is_shown_until_it_is_lost(chromium):
         page.goto(address)
         page.get_by_text("waiting for frames").wait_for()
         others = [
-            started("ecu", "--bus", hub.bus, "--realtime", "--silence-s", 30),
-            started("plant", "--bus", hub.bus, "--max-time-s", 600, "--realtime"),
+            started("ecu", "--bus", hub.bus, "--silence-s", 30),
+            started("plant", "--bus", hub.bus, "--answer-timeout-s", 30),
         ]
         try:
             page.locator("#state", has_text="charging").wait_for()
