@@ -18,7 +18,7 @@ from bms.presets import DEFAULT_PRESET, Preset, load_preset, preset_names
 from codegen import can_database
 from hil_sim.bus.catalog import FirstFault
 from hil_sim.bus.database import load_codecs
-from hil_sim.dashboard.scenario import PUBLISHED, scenario_bytes
+from hil_sim.dashboard.scenario import scenario_bytes
 from hil_sim.fault_matrix.matrix import Row, fault_numbers, load_matrix
 from hil_sim.fault_matrix.place import nominal_initial, nominal_onset
 from hil_sim.fault_matrix.size import sized
@@ -66,7 +66,6 @@ def database_data() -> dict[str, Any]:
             for codec in codecs.values()
             for signal, names in codec.choices.items()
         },
-        "published": list(PUBLISHED),
         "faults": _fault_names(),
     }
 

@@ -25,7 +25,7 @@ from hil_sim.studies.campaign._runner import ffi as runner
 from hil_sim.studies.campaign.engine import Scenario
 from hil_sim.studies.campaign.settings import CampaignSettings
 
-PUBLISHED = (
+_PUBLISHED = (
     Message.CELL_ELECTRICAL,
     Message.CELL_THERMAL,
     Message.COOLANT,
@@ -46,8 +46,8 @@ def scenario_bytes(preset: Preset, model: KanModel) -> bytes:
         "session_scenario_t *",
         {
             "published": {
-                "messages": len(PUBLISHED),
-                "message": [_message(codecs[name]) for name in PUBLISHED],
+                "messages": len(_PUBLISHED),
+                "message": [_message(codecs[name]) for name in _PUBLISHED],
             },
             "command": _message(command),
             "normals": ziggurat_tables(),

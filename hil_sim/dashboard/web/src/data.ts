@@ -22,7 +22,6 @@ export interface Message {
 export interface Database {
   messages: Message[];
   choices: Record<string, Record<string, string>>; // by signal
-  published: string[]; // by the plant, in the order of a period
   faults: string[]; // by number
 }
 

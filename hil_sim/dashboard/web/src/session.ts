@@ -113,6 +113,9 @@ export class Session {
       for (let period = 0; period < this.steps; period++) {
         this.advanceBeside();
       }
+      if (this.end !== null) {
+        this.finishBeside();
+      }
     }
   }
 
