@@ -79,9 +79,9 @@ def browser() -> Iterator[Any]:
             started.close()
 
 
-def wait_for_end(page: Any, why: str = "complete") -> None:
-    """Return when the run in the page is over for a reason."""
-    page.wait_for_selector(f'body[data-end="{why}"]', timeout=PATIENCE_MS)
+def wait_for_end(page: Any, run: int = 1) -> None:
+    """Return when the charge of that number since the page was loaded is complete."""
+    page.wait_for_selector(f'body[data-run="{run}"][data-end="complete"]', timeout=PATIENCE_MS)
 
 
 def set_speed(page: Any, name: str) -> None:
@@ -109,7 +109,8 @@ def draw_charge(page: Any, path: Path) -> None:
     page.check("#beside")
     page.get_by_role("button", name="Charge anew").click()
     # On a machine that is too busy to see the one, the other.
-    page.wait_for_selector('#state[data-state="derated"], body[data-end="complete"]')
+    again = 'body[data-run="2"]'
+    page.wait_for_selector(f'{again} #state[data-state="derated"], {again}[data-end="complete"]')
     page.get_by_role("button", name="Pause").click()
     page.wait_for_timeout(300)
     page.screenshot(path=path)

@@ -120,8 +120,7 @@ def test_seed_mode_and_start_are_those_of_bms_sil(page, preset, tmp_path):
     page.locator("#full-by").fill("900")
     set_speed(page, "as fast as it goes")
     page.get_by_role("button", name="Charge anew").click()
-    page.wait_for_selector('body[data-end=""]')
-    wait_for_end(page)
+    wait_for_end(page, run=2)
     expected = logged(preset, tmp_path / "sil.log", seed=7, mode=Mode.BY_TIME, full_by_s=900.0)
     assert saved_log(page, tmp_path).read_bytes() == expected
 
@@ -138,7 +137,7 @@ def test_s_cbf_beside_it_is_that_of_bms_sil_whenever_it_is_switched_on(page, pre
     page.check("#beside")  # behind the charge, which it then has to catch up with
     page.locator("#decision", has_text=expected).wait_for()
     page.get_by_role("button", name="Charge anew").click()
-    page.locator("#decision", has_text="charging, core up to").wait_for()
+    wait_for_end(page, run=2)
     page.locator("#decision", has_text=expected).wait_for()
 
 
@@ -168,7 +167,7 @@ def test_everything_is_within_reach_of_the_keyboard(page):
     assert "lost once" in reached
     page.focus("#restart")
     page.keyboard.press("Enter")
-    page.wait_for_selector('body[data-end=""]')
+    page.wait_for_selector('body[data-run="2"]')
     page.focus("#pause")
     page.keyboard.press("Space")
     assert page.inner_text("#pause") == "Go on"

@@ -121,6 +121,7 @@ async function simulate(config: Config, database: Database): Promise<void> {
         view.charts.add(data.samples);
         view.show(data.snapshot);
         matrix.show(data.snapshot.verdicts);
+        document.body.dataset["run"] = String(run);
         document.body.dataset["end"] = data.snapshot.end ?? "";
         setText(byId("footer"), data.snapshot.end === null ? "" : `The run is over: ${data.snapshot.end}.`);
         break;
