@@ -36,7 +36,7 @@ export function listen(listener: FeedListener): void {
   expect();
   socket.addEventListener("message", (event: MessageEvent<string>) => {
     expect();
-    const message = JSON.parse(event.data) as FeedMessage;
+    const message = parsed(event.data);
     if (message.error !== undefined) {
       reason = message.error;
     } else if (message.snapshot !== undefined) {
@@ -49,6 +49,14 @@ export function listen(listener: FeedListener): void {
     clearTimeout(timer);
     listener.ended(reason ?? "the server has ended the feed; start 'bms dashboard' and reload");
   });
+}
+
+function parsed(text: string): FeedMessage {
+  try {
+    return JSON.parse(text) as FeedMessage;
+  } catch {
+    return { error: "the server has said what is no JSON; reload the page" };
+  }
 }
 
 function silence(message: FeedMessage): string | null {
