@@ -3,12 +3,13 @@
 set -eu
 flags="-std=c99 -pedantic -Wall -Wextra -Werror -Wconversion -Wdouble-promotion -Wmissing-prototypes -fsyntax-only"
 native=hil_sim/native runner=hil_sim/studies/campaign/native rivals=bms/studies/rivals/native programs=tests/firmware/native
+page=hil_sim/dashboard/native
 includes=""
 for part in include src generated image boot port host; do includes="$includes -Ifirmware_c/$part"; done
 
 for source in firmware_c/src/*.c firmware_c/generated/*.c firmware_c/image/*.c firmware_c/boot/*.c firmware_c/port/*.c \
-  firmware_c/host/*.c "$native"/*.c "$runner"/*.c "$rivals"/*.c "$programs"/*.c; do
-  ${CC:-cc} $flags $includes -I"$native" -I"$runner" -I"$rivals" -I"$programs" "$source"
+  firmware_c/host/*.c "$native"/*.c "$runner"/*.c "$rivals"/*.c "$page"/*.c "$programs"/*.c; do
+  ${CC:-cc} $flags $includes -I"$native" -I"$runner" -I"$rivals" -I"$page" -I"$programs" "$source"
 done
 for source in firmware_c/port/linux/*.c hil_sim/bus/*.c; do # the operating system's own interface is beyond C99
   ${CC:-cc} $flags -D_DEFAULT_SOURCE $includes "$source"
