@@ -24,8 +24,8 @@ import pytest
 from packaging.requirements import Requirement
 
 from bms.presets import DEFAULT_PRESET, load_preset
-from hil_sim.fmu.plant import PLANT_FILES, plant_unit
 from hil_sim.dashboard.build import STATIC
+from hil_sim.fmu.plant import PLANT_FILES, plant_unit
 from tests.firmware.ports import image, needs_compiler
 from tests.hil_sim.dashboard_page import needs_page
 
