@@ -23,7 +23,7 @@ QUICK_TESTS ?= $(foreach test, calibration_choice charge_mode codec codec_messag
   tests/codegen/test_generated.py $(foreach test, barrier_constants model_file presets, tests/bms/test_$(test).py) \
   $(foreach test, database plant_node replay_golden, tests/hil_sim/test_$(test).py)
 
-.PHONY: help build run page dashboard quick test lint generate models verify-tables long-checks fuzz fuzz-frames fuzz-logs benchmark docs clean
+.PHONY: help build run page dashboard quick test lint coverage misra mutants proofs generate models verify-tables long-checks fuzz fuzz-frames fuzz-logs benchmark docs clean
 .DEFAULT_GOAL := help
 
 help: ## List the targets
@@ -56,6 +56,7 @@ test: .venv/tests build/extensions build/sanitized/done lint
 	fi
 	$(PYTEST) --dist loadfile --durations 20
 	tools/sanitized_tests.sh
+	$(MAKE) --no-print-directory misra coverage
 endif
 
 lint: .venv/tests ## Types, style, imports one way, C warnings
@@ -64,6 +65,18 @@ lint: .venv/tests ## Types, style, imports one way, C warnings
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo --no-cache
 	CC="$(CC)" tools/c_warnings.sh
+
+coverage: .venv/tests .venv/gates build/extensions ## Branches and conditions (MC/DC) of the C core that the tests reach, against tools/gates/coverage.toml
+	$(BIN)/python -m tools.gates.coverage
+
+misra: .venv/tests .venv/gates ## MISRA C:2012 over the C core by cppcheck, against the deviations in tools/gates/misra.toml
+	$(BIN)/python -m tools.gates.misra
+
+mutants: .venv/tests build/extensions ## Mutants of the C sources that have changed since results/mutants.json, on the tests of each
+	$(BIN)/python tools/long_checks.py mutants
+
+proofs: .venv/tests ## What CBMC proves of the C core, for all inputs (tests/firmware/proofs)
+	$(BIN)/python tools/long_checks.py proofs
 
 generate: build/extensions ## Write firmware_c/generated anew from preset, model and CAN database
 	$(BIN)/python -m codegen
@@ -111,6 +124,12 @@ clean: ## Remove everything that set-up, build and runs have made
 .venv/tests: .venv/runtime tools/debian_packages.sh
 	tools/debian_packages.sh
 	$(INSTALL) --no-build-isolation --editable '.[test]'
+	$(INSTALL) --no-deps universalmutator # what it wants beside is for a way of mutating that is not used
+	touch $@
+
+# Other systems have other names for these packages; the gates say what is missing.
+.venv/gates: .venv/runtime tools/debian_packages.sh
+	tools/debian_packages.sh gates || test -z "$$CI"
 	touch $@
 
 .venv/docs: .venv/runtime

@@ -26,7 +26,11 @@ from bms.errors import InputError
 ROOT = Path(__file__).resolve().parents[1]
 """Where bms, codegen, hil_sim and firmware_c lie: a repository, or a folder of packages."""
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno")
-SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+SANITIZERS = (
+    "-g",
+    "-fsanitize=address,undefined,float-cast-overflow",
+    "-fno-sanitize-recover=all",
+)
 
 _REMEDY = "make one with 'python -m bms.native_build --tree TREE --out FOLDER'"
 _HASH_DECLARATION = "const char *native_source_hash(void);"

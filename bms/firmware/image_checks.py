@@ -24,7 +24,9 @@ class ImagePart:
     """
 
     def __init__(self, content: bytes, address: int) -> None:
-        self._words = ffi.new("uint64_t[]", (len(content) + 7) // 8)
+        # As in flash, there is memory behind a part that is shorter than what its header is for.
+        room = max(len(content), HEADER_LENGTH + ffi.sizeof("bms_calibration_t"))
+        self._words = ffi.new("uint64_t[]", (room + 7) // 8)
         ffi.memmove(self._words, content, len(content))
         self.memory: Any = ffi.new(
             "image_memory_t *",

@@ -47,7 +47,7 @@ class FamilyCode:
 
     def of(self, preset: str) -> FamilyCode:
         """The same code with the constants of another preset."""
-        return _with_constants(preset, self.ffi, self.lib)
+        return with_constants(preset, self.ffi, self.lib)
 
     def reading(self, **values: Any) -> Any:
         """family_reading_t * of a cell at rest at 298 K, but for the values given."""
@@ -84,10 +84,10 @@ def family_code(
     out: Path, preset: str = "a123_26650_10C", change: tuple[str, str, str] | None = None
 ) -> FamilyCode:
     """Compile the family's sources, perhaps with one of them changed (file, old, new)."""
-    return _with_constants(preset, *load_library(out, SOURCES, HEADERS, change))
+    return with_constants(preset, *load_library(out, SOURCES, HEADERS, change))
 
 
-def _with_constants(preset: str, ffi: FFI, lib: Any) -> FamilyCode:
+def with_constants(preset: str, ffi: FFI, lib: Any) -> FamilyCode:
     loaded, model = load_pair(preset, None)
     fields = calibration_fields(loaded, model)
     constants = ffi.new("family_constants_t *", fields["family"])

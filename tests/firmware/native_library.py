@@ -13,9 +13,13 @@ from typing import Any
 
 from cffi import FFI
 
-from bms.native_build import FLAGS, declarations
+from bms.native_build import FLAGS, SANITIZERS, declarations
 
 FIRMWARE = Path(__file__).parents[2] / "firmware_c"
+VARIANT = "BMS_SOURCE_VARIANT"
+"""Environment variable with the path of a changed source, which stands for the one of its name."""
+SANITIZE = "BMS_SANITIZE"
+"""Environment variable with which libraries are built with the sanitizers, too."""
 FOLDERS = ("include", "src", "generated", "image", "boot", "port")
 
 
@@ -25,17 +29,21 @@ def load_library(
     headers: Sequence[str],
     change: tuple[str, str, str] | None = None,
     extra: str = "",
+    flags: Sequence[str] = (),
 ) -> tuple[FFI, Any]:
     """Declarations and library of sources; headers are paths in firmware_c, in order.
 
-    `change` replaces a text in the source of that name by another one; `extra` declares more.
+    `change` replaces a text in the source of that name by another one; `extra` declares more;
+    `flags` are for the compiler.
     """
     out.mkdir(parents=True, exist_ok=True)
     files = [_changed(source, out, change) for source in sources]
     library = out / "library.so"
     includes = [f"-I{FIRMWARE / folder}" for folder in FOLDERS]
     compiler = os.environ.get("CC", "gcc")
-    command = [compiler, *FLAGS, "-O0", "-fPIC", "-shared", *includes, *map(str, files), "-lm"]
+    sanitizers = SANITIZERS if os.environ.get(SANITIZE) else ()
+    command = [compiler, *FLAGS, "-O0", "-fPIC", "-shared", *sanitizers, *flags, *includes]
+    command += [*map(str, files), "-lm"]
     subprocess.run([*command, "-o", str(library)], check=True)
     ffi = FFI()
     ffi.cdef("\n".join([*(declarations(FIRMWARE / header) for header in headers), extra]))
@@ -43,6 +51,9 @@ def load_library(
 
 
 def _changed(source: Path, out: Path, change: tuple[str, str, str] | None) -> Path:
+    variant = Path(os.environ.get(VARIANT, ""))
+    if source.name == variant.name:
+        source = variant
     if change is None or source.name != change[0]:
         return source
     text = source.read_text(encoding="utf-8")

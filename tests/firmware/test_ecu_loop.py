@@ -204,6 +204,43 @@ def test_after_a_stall_missed_periods_are_not_caught_up_and_the_phase_stays(
     assert port.step_times_ms() == [start_ms + ms for ms in (50, late_ms, *in_phase)]
 
 
+def test_measurements_that_waited_in_a_stall_do_not_move_the_phase(port: Port) -> None:
+    start_ms = port.now_ms
+    port.waiting = [(start_ms, measurements(0)[0])]
+    port.run_until(start_ms + 100)
+    port.waiting = [(start_ms + 149 + n, measurements(1 + n)[0]) for n in range(0, 40, 2)]
+    port.now_ms += 100
+    port.run_until(start_ms + 1000)
+    steps_ms = [ms - start_ms for ms in port.step_times_ms()]
+    assert steps_ms == [50, 200, *range(250, 1000, PERIOD_MS)]
+
+
+@pytest.mark.parametrize(("state", "stepped"), [(1, True), (2, False), (3, False), (4, True)])
+def test_a_sync_moves_the_time_of_no_charge_whether_derated_or_not(
+    port: Port, state: int, stepped: bool
+) -> None:
+    start_ms = port.now_ms
+    port.waiting = [(start_ms, measurements(0)[0])]
+    port.run_until(start_ms + 60)
+    port.loop.bms.state = state
+    port.waiting = [(start_ms + 70, SYNC)]
+    port.run_until(start_ms + 80)
+    assert (start_ms + 70 in port.step_times_ms()) is stepped
+
+
+def test_without_a_calibration_it_says_so_every_tenth_of_a_second(
+    library: tuple[Any, Any],
+) -> None:
+    ffi, lib = library
+    port = Port(ffi, lib)
+    lib.ecu_loop_init(port.loop, ffi.NULL)
+    port.waiting = [(0, measurements(0)[0])]
+    port.run_until(1000)
+    assert port.step_times_ms() == [50 + PERIOD_MS * n for n in range(10)]
+    assert port.command()["CommandCurrent"] == 0.0
+    assert STATES[int(port.command()["CommandState"])] == "Fault"
+
+
 @pytest.mark.parametrize("period_ms", [99.8, 100.2])
 def test_steps_stay_between_the_measurements_of_a_clock_that_runs_apart(
     port: Port, period_ms: float

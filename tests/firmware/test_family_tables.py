@@ -292,3 +292,34 @@ def test_each_value_of_a_table_that_makes_no_sense_is_refused(code: FamilyCode) 
 def test_a_preset_of_one_cell_needs_no_family(code: FamilyCode) -> None:
     nothing = code.ffi.new("family_constants_t *", {"is_stated": 0})
     assert code.lib.family_constants_are_valid(nothing)
+
+
+@pytest.mark.parametrize("name", ["overpotential_V", "at_least_A", "past_A", "resistance_ohm"])
+def test_heat_that_is_no_number_leaves_no_strength(code: FamilyCode, name: str) -> None:
+    fields = {
+        "overpotential_V": 0.1,
+        "at_least_A": 1.0,
+        "past_A": 2.0,
+        "resistance_ohm": 0.02,
+        "least_resistance_ohm": 0.01,
+        "polarisation_ohm": 0.01,
+    }
+    heat = code.ffi.new("family_heat_t *", {**fields, name: math.nan})
+    assert code.lib.family_measured_strength_A(heat, 0.0, 0.0, 1.0) == -1.0
+    sound = code.ffi.new("family_heat_t *", fields)
+    assert code.lib.family_measured_strength_A(sound, 0.0, 0.0, 1.0) > 0.0
+
+
+@pytest.mark.parametrize("slope", [-0.9, -1e-3, 0.0, 1e-3, 0.9])
+def test_the_root_keeps_its_digits_whatever_the_sign_of_the_slope(
+    code: FamilyCode, slope: float
+) -> None:
+    """A reversible heat that cools: 0.001 a^2 - 0.9 a = 1e-6 at 900 A, not at infinity."""
+    square, limit_W = 1e-3, 1e-6
+    fields = {"resistance_ohm": square, "least_resistance_ohm": square}
+    heat = code.ffi.new("family_heat_t *", fields)
+    exact = np.float64(np.float32(slope)), np.float64(np.float32(square))
+    root = math.sqrt(exact[0] ** 2 + 4.0 * exact[1] * limit_W)
+    expected_A = 2.0 * limit_W / (exact[0] + root) if slope > 0 else (root - exact[0]) / 2e-3
+    strength_A = code.lib.family_measured_strength_A(heat, 0.0, slope, limit_W)
+    assert strength_A == pytest.approx(expected_A, rel=1e-5)

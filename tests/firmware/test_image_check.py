@@ -11,7 +11,7 @@ import pytest
 from bms.errors import InputError
 from bms.firmware.image_checks import IMAGE_OK, IMAGE_STATUS_NAMES
 from bms.image import Header, check_image
-from bms.image.check import REASONS
+from bms.image.check import REASONS, check_calibration
 from bms.image.floor import FLOOR_LENGTH
 from tests.firmware.damaged_images import (
     APPLICATION,
@@ -23,6 +23,8 @@ from tests.firmware.damaged_images import (
     BootStage,
     damaged_images,
     flipped,
+    parts,
+    resealed,
 )
 from tests.firmware.native_library import FIRMWARE, load_library
 from tests.firmware.ports import image, needs_compiler
@@ -132,6 +134,17 @@ def test_no_truncated_or_longer_image_is_taken(boot_stage: BootStage) -> None:
             assert boot_stage.verdict(content[:end]) != ("", "OK"), f"{end} bytes"
     for tail in (b"\xff", b"\x00", content):
         assert not host_takes(content + tail)
+
+
+@pytest.mark.parametrize("length", [60, 64, 200, 1000, 2000])
+def test_a_calibration_part_that_ends_before_its_model_is_refused(length: int) -> None:
+    """With CRC and hash of what is there; the checks read nothing behind what is theirs."""
+    content = image()
+    _, calibration = parts(content)
+    assert length < len(calibration)
+    short = resealed(calibration[:length], length=length)
+    with pytest.raises(InputError, match="calibration"):
+        check_calibration(short, content, "part")
 
 
 def test_noise_is_refused(boot_stage: BootStage) -> None:

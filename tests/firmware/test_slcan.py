@@ -101,6 +101,7 @@ def test_a_closed_channel_carries_nothing(library: tuple[Any, Any]) -> None:
         (b"N\r", b"N0000\r"),
         (b"F\r", b"F00\r"),
         (b"Z1\r", b"\r"),
+        (b"L\r", b"\r"),
         (b"\r", b""),
     ],
 )
@@ -223,3 +224,19 @@ def test_flags_tell_what_was_lost_since_they_were_asked_for(line: Line) -> None:
     line.put(b"F\rF\r")
     line.received()
     assert line.text().startswith(b"F02\rF00\r")
+
+
+@pytest.mark.parametrize("written", [0, 2**32 - 1, 2**32 - 3])
+def test_a_ring_works_on_when_its_counters_begin_anew(
+    library: tuple[Any, Any], written: int
+) -> None:
+    ffi, lib = library
+    ring, byte = ffi.new("ring_t *"), ffi.new("uint8_t *")
+    ring.read = ring.written = written
+    for value in range(6):
+        assert lib.ring_put(ring, value)
+        assert lib.ring_room(ring) == BUFFER_BYTES - 1
+        assert lib.ring_get(ring, byte) and byte[0] == value
+        assert not lib.ring_get(ring, byte)
+    assert all(lib.ring_put(ring, 7) for _ in range(BUFFER_BYTES))
+    assert not lib.ring_put(ring, 7) and lib.ring_room(ring) == 0

@@ -1,0 +1,221 @@
+"""Tries mutants of the C core on the tests of each source, and holds the survivors to the reviewed.
+
+    python -m tests.firmware.mutants.run [SOURCE...] [--all] [--survivors]
+
+A process that has loaded what the tests need beside the firmware forks for each mutant. A mutant is
+killed by the first test that fails, by a crash, or by time. results/mutants.json keeps what was
+found for each source; a source that has not changed since is not tried again. A survivor has to
+stand in survivors.toml, with what makes it equivalent or harmless; else the run fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import os
+import resource
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import hypothesis
+import pytest
+
+from bms.native_build import ROOT
+from tests.firmware.mutants.build import Built, Factory, compiled_firmware, sources_hash
+from tests.firmware.native_library import VARIANT
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+HERE = Path(__file__).parent
+RESULTS = ROOT / "results" / "mutants.json"
+PARTIAL = ROOT / "build" / "mutants.json"
+LEFT_OUT = "not mutant and not emulat and not taken_away and not broken_rule"
+NO_KEYS: frozenset[str] = frozenset()
+_PROFILE = "mutants"
+_HEAVY = (
+    *("numpy", "scipy.optimize", "scipy.sparse", "cantools.autosar", "can", "osqp", "pydantic"),
+    *("bms.model.pair", "bms.calibration", "codegen.can_database"),
+)
+"""What the tests import, but for the firmware and what imports it."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """plan.toml: how many mutants of each source, and the tests for them."""
+
+    per_line: float
+    least: int
+    longest_s: int
+    tests: dict[str, list[str]]
+
+    @classmethod
+    def load(cls) -> Plan:
+        return cls(**tomllib.loads((HERE / "plan.toml").read_text(encoding="utf-8")))
+
+    def all_tests(self) -> list[str]:
+        """Every test file of the plan, once."""
+        return sorted({name for names in self.tests.values() for name in names})
+
+    def number(self, source: str) -> int:
+        """How many mutants of a source are tried."""
+        lines = (ROOT / source).read_text(encoding="utf-8").count("\n")
+        return max(self.least, round(self.per_line * lines))
+
+
+def prepare() -> None:
+    """Load what every mutant's tests need, and have hypothesis look for no smallest example."""
+    for name in _HEAVY:
+        importlib.import_module(name)
+    phases = (hypothesis.Phase.explicit, hypothesis.Phase.generate)
+    hypothesis.settings.register_profile(
+        _PROFILE, deadline=None, phases=phases, database=None, derandomize=True
+    )
+
+
+def survives(built: Built | None, tests: Sequence[str], longest_s: int) -> bool:
+    """Whether all tests pass with the mutant, or with none, in a process of its own."""
+    sys.stdout.flush()
+    child = os.fork()
+    if child == 0:
+        os.setpgid(0, 0)
+        # Of processor time: other work on the machine kills no mutant.
+        resource.setrlimit(resource.RLIMIT_CPU, (longest_s, longest_s))
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, 1)
+        os.dup2(null, 2)
+        if built is not None:
+            os.environ[VARIANT] = str(built.source)
+        options = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "-k", LEFT_OUT]
+        options += [f"--hypothesis-profile={_PROFILE}"]
+        if built is not None and built.extension is not None:
+            options += ["--firmware-build", str(built.extension)]
+        files = [f"tests/firmware/test_{name}{'' if '::' in name else '.py'}" for name in tests]
+        os._exit(int(pytest.main([*options, *files])))
+    until = time.monotonic() + 20 * longest_s  # of one that waits for what does not come
+    while time.monotonic() < until:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            return os.waitstatus_to_exitcode(status) == 0
+        time.sleep(0.01)
+    os.killpg(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return False
+
+
+def try_source(
+    source: str, factory: Factory, plan: Plan, number: int | None, only: frozenset[str] = NO_KEYS
+) -> tuple[str, dict[str, Any]]:
+    """What became of the drawn mutants of a source; of all of them without a number.
+
+    With `only`, all but those count as killed without being tried.
+    """
+    killed, survivors, start_s = 0, [], time.monotonic()
+    for built in islice(factory.built(source), number):
+        is_tried = not only or built.mutant.key in only
+        if is_tried and survives(built, plan.tests[source], plan.longest_s):
+            survivors.append(built.mutant.key)
+            print(f"survives: {source}:{built.mutant.line}: {built.mutant.key}", file=sys.stderr)
+        else:
+            killed += 1
+    took = f"{killed} killed, {len(survivors)} survive, {time.monotonic() - start_s:.0f} s"
+    print(f"{source}: {took}", file=sys.stderr, flush=True)
+    return source, {
+        "sha256": sources_hash(source),
+        "tried": killed + len(survivors),
+        "killed": killed,
+        "survivors": sorted(survivors),
+    }
+
+
+def _try(task: tuple[str, Factory, Plan, int | None, frozenset[str]]) -> tuple[str, dict[str, Any]]:
+    return try_source(*task)
+
+
+def unreviewed(found: dict[str, Any], reviewed: dict[str, str]) -> list[str]:
+    """Survivors that nobody has argued about, and arguments about mutants that are killed."""
+    survivors = {key for entry in found.values() for key in entry["survivors"]}
+    complaints = [
+        f"no argument for the survivor {key}" for key in sorted(survivors - set(reviewed))
+    ]
+    gone = sorted(set(reviewed) - survivors)
+    complaints += [f"{key} is argued about, but it is killed or not made any more" for key in gone]
+    complaints += [
+        f"no words in the argument for {key}" for key, why in reviewed.items() if not why
+    ]
+    return complaints
+
+
+def reviewed_survivors() -> dict[str, str]:
+    """The reviewed list: the argument for each surviving mutant."""
+    content = tomllib.loads((HERE / "survivors.toml").read_text(encoding="utf-8"))
+    return {entry["mutant"]: entry["why"].strip() for entry in content.get("survivor", [])}
+
+
+def kept() -> dict[str, Any]:
+    """What is known of each source from results/mutants.json and from a run that has not ended."""
+    found: dict[str, Any] = {}
+    if RESULTS.is_file():
+        found.update(json.loads(RESULTS.read_text(encoding="utf-8"))["said"]["sources"])
+    if PARTIAL.is_file():
+        found.update(json.loads(PARTIAL.read_text(encoding="utf-8")))
+    return found
+
+
+def main() -> int:
+    """Try the mutants of changed sources; 1 when a survivor is not in the reviewed list."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("sources", nargs="*", help="try these, changed or not")
+    parser.add_argument("--all", action="store_true", help="every source, every mutant: hours")
+    parser.add_argument("--survivors", action="store_true", help="try those again, no others")
+    parser.add_argument("--jobs", type=int, default=2, help="sources at a time")
+    arguments = parser.parse_args()
+    os.chdir(ROOT)
+    plan, found = Plan.load(), kept()
+    wanted = arguments.sources or [
+        source
+        for source in plan.tests
+        if arguments.all or found.get(source, {}).get("sha256") != sources_hash(source)
+    ]
+    again = dict.fromkeys(wanted, NO_KEYS)
+    if arguments.survivors:
+        again = {s: frozenset(entry["survivors"]) for s, entry in found.items()}
+        wanted = [source for source in again if again[source]]
+    wanted.sort(key=plan.number, reverse=True)
+    prepare()
+    with tempfile.TemporaryDirectory() as folder, get_context("fork").Pool(arguments.jobs) as pool:
+        firmware = compiled_firmware(Path(folder) / "firmware")
+        if wanted and not survives(None, plan.all_tests(), 10 * plan.longest_s):
+            print("mutants: the tests fail without any", file=sys.stderr)
+            return 1
+        factories = [Factory(firmware, Path(folder) / str(i)) for i in range(len(wanted))]
+        numbers = [None if arguments.all else plan.number(source) for source in wanted]
+        keys = [again[source] for source in wanted]
+        tasks = zip(wanted, factories, [plan] * len(wanted), numbers, keys)
+        for source, entry in pool.imap_unordered(_try, tasks):
+            found[source] = entry
+            PARTIAL.parent.mkdir(exist_ok=True)
+            PARTIAL.write_text(json.dumps(found), encoding="utf-8")
+    found = {source: found[source] for source in plan.tests if source in found}
+    complaints = unreviewed(found, reviewed_survivors())
+    for complaint in complaints:
+        print(f"mutants: {complaint}", file=sys.stderr)
+    tried = sum(entry["tried"] for entry in found.values())
+    killed = sum(entry["killed"] for entry in found.values())
+    print(json.dumps({"tried": tried, "killed": killed, "sources": found}, indent=1))
+    return int(bool(complaints))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
