@@ -1,0 +1,188 @@
+"""What a pack's constants have to hold in reserve for cells that differ from the preset's.
+
+docs/pack.md has the derivation of each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+from bms.arrays import Array
+from bms.barrier import barrier_constants
+from bms.barrier.surface_prediction import surface_prediction
+from bms.bus_signals import BUS
+from bms.cell import CellFactors, CellParameters, scaled
+from bms.errors import InputError
+from bms.presets import Preset
+from hil_sim.studies.pack.spread import Spread, Surroundings
+
+_STEP_S = 0.5
+_SETTLED = 10.0  # time constants after which nothing is left of an impulse
+
+
+@dataclass(frozen=True)
+class Reserves:
+    """Constants for a pack: changes of the calibration, and what a cell without thermistor needs.
+
+    `bare` has the members of pack_bare_t.
+    """
+
+    changes: dict[str, float]
+    bare: dict[str, float]
+
+
+def greatest_heat_W(preset: Preset, spread: Spread) -> float:
+    """Heat of the cell with the greatest resistance at the strongest current, core at its limit."""
+    cell, limits = preset.cell, preset.limits
+    strength_A = -limits.reference_current_A
+    reversible_V = max(0.0, cell.entropic_coefficient_V_per_K) * limits.max_core_temperature_K
+    ohm = spread.resistance[1] * cell.ohmic_resistance_ohm
+    return (ohm * strength_A + reversible_V) * strength_A
+
+
+def neighbour_gap_K(preset: Preset, spread: Spread) -> float:
+    """Bound on the difference of two cells' surfaces in a steady state.
+
+    The one has the greatest heat and resistance to the coolant, the other the least of both. In a
+    transient it is less, since both begin at one temperature.
+    """
+    cell = preset.cell
+    most_W = greatest_heat_W(preset, spread)
+    least = spread.resistance[0] * spread.surface_resistance[0]
+    most = spread.resistance[1] * spread.surface_resistance[1]
+    return cell.surface_resistance_K_per_W * most_W * (most - least) / spread.resistance[1]
+
+
+def coupling_K_per_s(preset: Preset, spread: Spread, around: Surroundings) -> float:
+    """Bound on the rate at which two neighbours change a cell's surface temperature."""
+    gap_K = neighbour_gap_K(preset, spread)
+    return 2.0 * around.neighbour_W_per_K * gap_K / preset.cell.surface_heat_capacity_J_per_K
+
+
+def reserves(preset: Preset, spread: Spread, around: Surroundings) -> Reserves:
+    """Constants that are sufficient for every cell of the spread.
+
+    Raises InputError for a preset whose spread is stated as a family already, or whose gains make
+    the core's condition depend on the estimate: then its power form is not the one that is
+    invariant over the spread.
+    """
+    if preset.cell.interval is not None:
+        raise InputError(f"preset '{preset.name}': states a family; its own intervals hold")
+    gain_per_s = preset.gains.core_gain_per_s(preset.cell)
+    nominal = barrier_constants(preset.cell, preset)
+    if abs(gain_per_s - nominal.a1_per_s) > 1e-6 * nominal.a1_per_s:
+        raise InputError(
+            f"preset '{preset.name}': gains.alpha2_per_s is not 1/(Rc Cc), so that no interval of "
+            "Rc is proven; leave it out, or choose paper_calibrated or a preset with intervals"
+        )
+    worst = scaled(
+        preset.cell,
+        CellFactors(
+            core_resistance=spread.core_resistance[1],
+            core_heat_capacity=spread.core_heat_capacity[1],
+            resistance=spread.resistance[1],
+            capacity=spread.capacity[0],
+        ),
+    )
+    return Reserves(
+        changes=_changes(preset, worst, spread, around), bare=_bare(preset, spread, around)
+    )
+
+
+def _changes(
+    preset: Preset, worst: CellParameters, spread: Spread, around: Surroundings
+) -> dict[str, float]:
+    """The core's and the voltage's condition of the worst cell, charge of the smallest."""
+    own = barrier_constants(worst, preset)
+    hold_s = preset.timing.sampling_period_s + preset.timing.delay_s
+    nominal_margin = _nominal_core_margin_K_per_s(preset)
+    return {
+        "capacity_As": worst.capacity_As,
+        "ohmic_resistance_ohm": worst.ohmic_resistance_ohm,
+        "a1_per_s": own.a1_per_s,
+        "alpha2_per_s": own.a1_per_s,
+        "a2_per_As": own.a2_per_As,
+        "a3_K_per_A2s": own.a3_K_per_A2s,
+        "core_margin_K_per_s": nominal_margin
+        + own.a1_per_s * hold_s * coupling_K_per_s(preset, spread, around),
+    }
+
+
+def _nominal_core_margin_K_per_s(preset: Preset) -> float:
+    from bms.barrier.margins import sampling_margins  # noqa: PLC0415
+
+    return float(sampling_margins(preset.cell, preset).core_K_per_s)
+
+
+def _bare(preset: Preset, spread: Spread, around: Surroundings) -> dict[str, float]:
+    cell, sensors = preset.cell, preset.sensors
+    most_W = greatest_heat_W(preset, spread)
+    other_K_per_W = _other_surface_K_per_W(preset, spread)
+    slowest_rs = cell.surface_resistance_K_per_W * spread.surface_resistance[1]
+    neighbours_W = 2.0 * around.neighbour_W_per_K * neighbour_gap_K(preset, spread)
+    # As though the coolant were uneven by all that one cell's heat makes of it.
+    uneven_K = most_W / around.flow_W_per_K
+    surface_K = (
+        surface_prediction(cell, preset).error_bound_K + slowest_rs * neighbours_W + uneven_K
+    )
+    core_K = surface_K + (other_K_per_W + _other_core_K_per_W(preset, spread)) * most_W
+    strength_A = -preset.limits.reference_current_A
+    entropic = abs(cell.entropic_coefficient_V_per_K)
+    rc = cell.core_resistance_K_per_W * spread.core_resistance[1]
+    return {
+        "resistance_factor": spread.resistance[1],
+        # What the smallest cell is ahead of the largest when it is full.
+        "soc_error": 1.0 - spread.capacity[0] / spread.capacity[1],
+        "voltage_error_V": sensors.voltage_V.error_bound + BUS.voltage_V,
+        "current_error_A": sensors.current_A.error_bound + BUS.current_A,
+        "surface_K": surface_K,
+        "surface_K_per_W": other_K_per_W,
+        "estimate_K": rc * entropic * strength_A * core_K,
+    }
+
+
+def _other_surface_K_per_W(preset: Preset, spread: Spread) -> float:
+    """By how much the surface of a cell of the spread can be above the nominal prediction.
+
+    For any course of a heat between 0 and 1 W: the integral of what its impulse response is above
+    the nominal one, at the worst of the spread's corners.
+    """
+    nominal = _impulses_K_per_J(preset.cell, preset.cell)[1]
+    return max(
+        float(np.sum(np.maximum(_impulses_K_per_J(corner, preset.cell)[1] - nominal, 0.0)))
+        for corner in spread.corners(preset.cell)
+    ) * _STEP_S
+
+
+def _other_core_K_per_W(preset: Preset, spread: Spread) -> float:
+    nominal = _impulses_K_per_J(preset.cell, preset.cell)[0]
+    return max(
+        float(np.sum(np.abs(_impulses_K_per_J(corner, preset.cell)[0] - nominal)))
+        for corner in spread.corners(preset.cell)
+    ) * _STEP_S
+
+
+def _impulses_K_per_J(cell: CellParameters, nominal: CellParameters) -> Array:
+    """Core and surface after one joule in the core, coolant held, every _STEP_S; (2, n).
+
+    The response of a step's mean: exact for heats that are constant over each step.
+    """
+    rc, cc = cell.core_resistance_K_per_W, cell.core_heat_capacity_J_per_K
+    rs, cs = cell.surface_resistance_K_per_W, cell.surface_heat_capacity_J_per_K
+    matrix = np.array(
+        [[-1.0 / (rc * cc), 1.0 / (rc * cc)], [1.0 / (rc * cs), -(1.0 / rc + 1.0 / rs) / cs]]
+    )
+    longest_s = (nominal.core_resistance_K_per_W + nominal.surface_resistance_K_per_W) * (
+        nominal.core_heat_capacity_J_per_K + nominal.surface_heat_capacity_J_per_K
+    )
+    step = expm(matrix * _STEP_S)
+    held = np.linalg.solve(matrix, (step - np.eye(2)) @ np.array([1.0 / cc, 0.0])) / _STEP_S
+    responses = np.empty((2, int(_SETTLED * longest_s / _STEP_S)))
+    for i in range(responses.shape[1]):
+        responses[:, i] = held
+        held = step @ held
+    return responses
+
