@@ -34,6 +34,9 @@ class Reserves:
     bare: dict[str, float]
 
 
+NO_RESERVES = Reserves({}, {})
+
+
 def greatest_heat_W(preset: Preset, spread: Spread) -> float:
     """Heat of the cell with the greatest resistance at the strongest current, core at its limit."""
     cell, limits = preset.cell, preset.limits
@@ -65,12 +68,12 @@ def coupling_K_per_s(preset: Preset, spread: Spread, around: Surroundings) -> fl
 def reserves(preset: Preset, spread: Spread, around: Surroundings) -> Reserves:
     """Constants that are sufficient for every cell of the spread.
 
-    Raises InputError for a preset whose spread is stated as a family already, or whose gains make
-    the core's condition depend on the estimate: then its power form is not the one that is
-    invariant over the spread.
+    A preset that states a family needs none, since its own intervals hold. Raises InputError for
+    gains that make the core's condition depend on the estimate: then its power form is not the one
+    that is invariant over the spread.
     """
     if preset.cell.interval is not None:
-        raise InputError(f"preset '{preset.name}': states a family; its own intervals hold")
+        return NO_RESERVES
     gain_per_s = preset.gains.core_gain_per_s(preset.cell)
     nominal = barrier_constants(preset.cell, preset)
     if abs(gain_per_s - nominal.a1_per_s) > 1e-6 * nominal.a1_per_s:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -68,12 +68,25 @@ class PackDraw:
     disturbances: tuple[Disturbance, ...]
 
 
+def family_factors(preset: Preset, rng: np.random.Generator) -> CellFactors:
+    """Factors of a cell of the family that a preset states, each uniform in its interval."""
+    interval = preset.cell.interval
+    assert interval is not None
+    ends = {field.name: getattr(interval, field.name) for field in fields(interval)}
+    del ends["longest_relaxation_s"]
+    pairs = {
+        name: value if isinstance(value, tuple) else (-value, value) for name, value in ends.items()
+    }
+    return CellFactors(**{name: float(rng.uniform(*pair)) for name, pair in pairs.items()})
+
+
 def draw_pack(
     preset: Preset, spread: Spread, cells: int, rng: np.random.Generator, disturbed: bool = True
 ) -> PackDraw:
     """A pack in equilibrium at the preset's start; states of charge stay between 0 and 1.
 
-    Each cell's disturbance is uniform within the preset's bounds at 0 A.
+    Of a preset that states a family the cells are anywhere in that, otherwise in the spread. Each
+    cell's disturbance is uniform within the preset's bounds at 0 A.
     """
     start, bounds = preset.initial, preset.uncertainty
     widest = np.array(
@@ -81,7 +94,9 @@ def draw_pack(
     )
     drawn, states, disturbances = [], [], []
     for _ in range(cells):
-        drawn.append(scaled(preset.cell, spread.factors(rng)))
+        is_family = preset.cell.interval is not None
+        factors = family_factors(preset, rng) if is_family else spread.factors(rng)
+        drawn.append(scaled(preset.cell, factors))
         soc = start.soc + float(rng.uniform(-spread.start_soc, spread.start_soc))
         states.append(CellState(min(max(soc, 0.0), 1.0), *[start.temperature_K] * 3))
         rates = widest * rng.uniform(-1.0, 1.0, 4) * (1.0 if disturbed else 0.0)
