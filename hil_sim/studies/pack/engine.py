@@ -70,6 +70,7 @@ class Core:
     def __post_init__(self) -> None:
         """Raises InputError or ModelMismatchError as bms.calibration.calibration_fields does."""
         fields = calibration_fields(self.preset, self.model, self.reserves.changes)
+        fields["plausibility"]["surface_deficit_K"] += self.reserves.deficit_K
         object.__setattr__(self, "calibration", ffi.new("bms_calibration_t *", fields))
 
 
@@ -155,10 +156,7 @@ class PackCharge:
         """Greatest state of charge, core and surface temperature and voltage of each cell."""
         peaks = [self._cells[i].peaks for i in range(self._count)]
         return np.array(
-            [
-                (p.soc, p.core_temperature_K, p.surface_temperature_K, p.voltage_V)
-                for p in peaks
-            ]
+            [(p.soc, p.core_temperature_K, p.surface_temperature_K, p.voltage_V) for p in peaks]
         )
 
     def advance(self, normals: Array) -> None:

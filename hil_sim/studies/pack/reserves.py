@@ -5,6 +5,7 @@ docs/pack.md has the derivation of each.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.linalg import expm
 
 from bms.arrays import Array
 from bms.barrier import barrier_constants
+from bms.barrier.margins import sampling_margins
 from bms.barrier.surface_prediction import surface_prediction
 from bms.bus_signals import BUS
 from bms.cell import CellFactors, CellParameters, scaled
@@ -27,11 +29,13 @@ _SETTLED = 10.0  # time constants after which nothing is left of an impulse
 class Reserves:
     """Constants for a pack: changes of the calibration, and what a cell without thermistor needs.
 
-    `bare` has the members of pack_bare_t.
+    `bare` has the members of pack_bare_t. A cell that stays cooler than the nominal one by
+    `deficit_K` has no broken thermistor.
     """
 
     changes: dict[str, float]
     bare: dict[str, float]
+    deficit_K: float = 0.0
 
 
 NO_RESERVES = Reserves({}, {})
@@ -91,7 +95,9 @@ def reserves(preset: Preset, spread: Spread, around: Surroundings) -> Reserves:
         ),
     )
     return Reserves(
-        changes=_changes(preset, worst, spread, around), bare=_bare(preset, spread, around)
+        changes=_changes(preset, worst, spread, around),
+        bare=_bare(preset, spread, around),
+        deficit_K=_deficit_K(preset, spread, around),
     )
 
 
@@ -101,7 +107,7 @@ def _changes(
     """The core's and the voltage's condition of the worst cell, charge of the smallest."""
     own = barrier_constants(worst, preset)
     hold_s = preset.timing.sampling_period_s + preset.timing.delay_s
-    nominal_margin = _nominal_core_margin_K_per_s(preset)
+    nominal_margin = float(sampling_margins(preset.cell, preset).core_K_per_s)
     return {
         "capacity_As": worst.capacity_As,
         "ohmic_resistance_ohm": worst.ohmic_resistance_ohm,
@@ -112,12 +118,6 @@ def _changes(
         "core_margin_K_per_s": nominal_margin
         + own.a1_per_s * hold_s * coupling_K_per_s(preset, spread, around),
     }
-
-
-def _nominal_core_margin_K_per_s(preset: Preset) -> float:
-    from bms.barrier.margins import sampling_margins  # noqa: PLC0415
-
-    return float(sampling_margins(preset.cell, preset).core_K_per_s)
 
 
 def _bare(preset: Preset, spread: Spread, around: Surroundings) -> dict[str, float]:
@@ -147,25 +147,38 @@ def _bare(preset: Preset, spread: Spread, around: Surroundings) -> dict[str, flo
     }
 
 
+def _deficit_K(preset: Preset, spread: Spread, around: Surroundings) -> float:
+    """By how much the surface of a cell can be below the prediction from the nominal resistance."""
+    less_W = (1.0 - spread.resistance[0]) * greatest_heat_W(preset, spread)
+    rs = preset.cell.surface_resistance_K_per_W
+    neighbours_W = 2.0 * around.neighbour_W_per_K * neighbour_gap_K(preset, spread)
+    uneven_K = greatest_heat_W(preset, spread) / around.flow_W_per_K
+    other_K_per_W = _differing_K_per_W(preset, spread, lambda more: np.maximum(-more[1], 0.0))
+    return other_K_per_W * greatest_heat_W(preset, spread) + rs * (less_W + neighbours_W) + uneven_K
+
+
 def _other_surface_K_per_W(preset: Preset, spread: Spread) -> float:
     """By how much the surface of a cell of the spread can be above the nominal prediction.
 
     For any course of a heat between 0 and 1 W: the integral of what its impulse response is above
     the nominal one, at the worst of the spread's corners.
     """
-    nominal = _impulses_K_per_J(preset.cell, preset.cell)[1]
-    return max(
-        float(np.sum(np.maximum(_impulses_K_per_J(corner, preset.cell)[1] - nominal, 0.0)))
-        for corner in spread.corners(preset.cell)
-    ) * _STEP_S
+    return _differing_K_per_W(preset, spread, lambda more: np.maximum(more[1], 0.0))
 
 
 def _other_core_K_per_W(preset: Preset, spread: Spread) -> float:
-    nominal = _impulses_K_per_J(preset.cell, preset.cell)[0]
-    return max(
-        float(np.sum(np.abs(_impulses_K_per_J(corner, preset.cell)[0] - nominal)))
+    """The same of the core, above or below."""
+    return _differing_K_per_W(preset, spread, lambda more: np.abs(more[0]))
+
+
+def _differing_K_per_W(preset: Preset, spread: Spread, counted: Callable[[Array], Array]) -> float:
+    """Integral of what counts of the corners' impulse responses less the nominal one, the worst."""
+    nominal = _impulses_K_per_J(preset.cell, preset.cell)
+    sums = (
+        np.sum(counted(_impulses_K_per_J(corner, preset.cell) - nominal))
         for corner in spread.corners(preset.cell)
-    ) * _STEP_S
+    )
+    return _STEP_S * float(max(sums))
 
 
 def _impulses_K_per_J(cell: CellParameters, nominal: CellParameters) -> Array:
@@ -188,4 +201,3 @@ def _impulses_K_per_J(cell: CellParameters, nominal: CellParameters) -> Array:
         responses[:, i] = held
         held = step @ held
     return responses
-

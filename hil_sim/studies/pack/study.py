@@ -37,7 +37,9 @@ def group_name(cells: int) -> str:
     return f"{WEAKEST}, 1 per {cells}"
 
 
-def controllers(settings: PackSettings, core: Core, bare_core: Core) -> dict[str, tuple[Core, View]]:
+def controllers(
+    settings: PackSettings, core: Core, bare_core: Core
+) -> dict[str, tuple[Core, View]]:
     """What each controller goes by and sees; a family has reserves in its intervals."""
     cells = settings.cells
     views: dict[str, tuple[Core, View]] = {WEAKEST: (core, all_cells(cells))}
@@ -51,7 +53,7 @@ def run_packs(settings: PackSettings, packs: Iterable[int]) -> list[Row]:
     """Rows of some packs; depend on settings and pack numbers only."""
     kept = reserves(settings.preset, settings.spread, settings.around)
     core = Core(settings.preset, settings.model, kept)
-    plain = Core(settings.preset, settings.model, Reserves({}, kept.bare))
+    plain = Core(settings.preset, settings.model, Reserves({}, kept.bare, kept.deficit_K))
     views = controllers(settings, core, plain)
     return [_run_pack(settings, core, views, pack) for pack in packs]
 

@@ -24,8 +24,7 @@ def summarise(settings: PackSettings, rows: Sequence[Row]) -> dict[str, Any]:
         "settings_hash": settings.hash,
         "slowest_alone_s": _spread_of(alone_s),
         "controllers": {
-            name: _controller([row["controllers"][name] for row in rows], alone_s)
-            for name in names
+            name: _controller([row["controllers"][name] for row in rows], alone_s) for name in names
         },
         "coupling": _coupling(settings, [row["controllers"][WEAKEST] for row in rows]),
     }
@@ -34,9 +33,7 @@ def summarise(settings: PackSettings, rows: Sequence[Row]) -> dict[str, Any]:
 def claim_holds(summary: dict[str, Any]) -> bool:
     """Whether no pack with a thermistor at some or all of its cells crossed a limit, and all
     became full."""
-    ours = [
-        figures for name, figures in summary["controllers"].items() if name.startswith(WEAKEST)
-    ]
+    ours = [figures for name, figures in summary["controllers"].items() if name.startswith(WEAKEST)]
     return all(
         figures["packs_over"] == 0 and figures["packs_full"] == figures["packs"] for figures in ours
     )
