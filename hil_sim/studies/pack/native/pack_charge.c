@@ -125,3 +125,10 @@ void pack_charge_advance(pack_charge_t *charge, const double *normals, uint32_t 
         run_period(charge, &normals[(size_t)i * width]);
     }
 }
+
+void pack_repeat(pack_t *pack, const pack_readings_t *readings, uint32_t sets, uint32_t periods)
+{
+    for (uint32_t i = 0u; i < periods; i++) {
+        pack_step(pack, &readings[i % sets]);
+    }
+}

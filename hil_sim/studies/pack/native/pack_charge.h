@@ -62,4 +62,7 @@ void pack_charge_begin(pack_charge_t *charge, const pack_config_t *config);
  * PACK_SHARED_NORMALS for each of them. */
 void pack_charge_advance(pack_charge_t *charge, const double *normals, uint32_t periods);
 
+/* Steps a pack over and over with these readings, one set after the other, for its time. */
+void pack_repeat(pack_t *pack, const pack_readings_t *readings, uint32_t sets, uint32_t periods);
+
 #endif
