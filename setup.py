@@ -10,7 +10,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 setup(
     cffi_modules=[
-        f"tools/native_extensions.py:{name}" for name in ("firmware", "rivals", "native", "runner", "pack")
+        f"tools/native_extensions.py:{name}"
+        for name in ("firmware", "rivals", "native", "runner", "pack")
     ],
     # cffi builds against the stable ABI; one wheel serves every Python from 3.10 on.
     options={"bdist_wheel": {"py_limited_api": "cp310"}},

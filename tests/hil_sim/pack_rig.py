@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
+import numpy as np
+
+from bms.cell import CellState, Disturbance, scaled
 from bms.model.pair import load_pair
 from hil_sim.studies.pack._pack import ffi, lib
-from hil_sim.studies.pack.engine import NO_THERMISTOR, Core
-from hil_sim.studies.pack.reserves import NO_RESERVES, Reserves, reserves
-from hil_sim.studies.pack.spread import Spread, Surroundings
+from hil_sim.studies.pack.engine import NO_THERMISTOR, Core, PackCharge, all_cells
+from hil_sim.studies.pack.reserves import NO_RESERVES, reserves
+from hil_sim.studies.pack.spread import PackDraw, Spread, Surroundings
 
 CHARGING = (2, 3)
 
 
-def core_of(preset_name, kept=None):
-    """Core with the preset's own constants, or with the reserves of the ordinary spread."""
+@cache
+def core_of(preset_name):
+    """Core with the preset's own constants."""
     preset, model = load_pair(preset_name, None)
-    if kept is None:
-        kept = NO_RESERVES
-    return Core(preset, model, kept)
+    return Core(preset, model, NO_RESERVES)
 
 
 def ordinary(preset_name):
@@ -78,13 +81,6 @@ class PackRig:
             lib.pack_step(self.pack, given)
         return self.pack.command_A
 
-    def start(self, settle=400):
-        """Settle, then ask for a charge."""
-        self.step(settle, charge=False)
-        self.step(1, charge=True)
-        assert self.pack.state in CHARGING, self.pack.state
-        return self
-
     def own_decision(self, cell, reference_A):
         """What one cell by itself admits."""
         return lib.pack_cell_decision(self.pack, self.given(), cell, reference_A)
@@ -99,6 +95,41 @@ def same(a, b):
     return a == b or (math.isnan(a) and math.isnan(b))
 
 
-def with_changes(preset_name, **changes):
-    """A core with some constants of the controller set to other values."""
-    return core_of(preset_name, Reserves(changes, {}))
+class PackLoop(PackRig):
+    """A rig whose readings come from a plant of coupled cells, with noise; one core, any order."""
+
+    def __init__(self, core, factors, soc=0.5, temperature_K=308.0, order=None, noise=1.0):
+        """`factors` are those of each cell; `order` is where in the core's string each stands."""
+        super().__init__(core, len(factors))
+        self.order = list(range(self.cells)) if order is None else order
+        states = (CellState(soc, *[temperature_K] * 3),) * self.cells
+        cells = tuple(scaled(core.preset.cell, factor) for factor in factors)
+        draw = PackDraw(cells, states, (Disturbance(),) * self.cells)
+        self._charge = PackCharge(core, draw, Surroundings(), all_cells(self.cells), 3600.0)
+        self.plant = ffi.addressof(self._charge.fields, "plant")
+        self.plant.cooling_power_W = 1.0
+        self._rng, self._noise, self.socs = np.random.default_rng(1), noise, [soc] * self.cells
+        self.run(20)
+        self.readings["charge"] = True
+        self.run(1)
+        assert self.pack.state in CHARGING, self.pack.state
+
+    def run(self, periods):
+        """Closed loop; the commands in A."""
+        return [self._period() for _ in range(periods)]
+
+    def _period(self):
+        current_A = self.pack.command_A
+        lib.plant_hold(self.plant, current_A, 10)
+        normals = self._noise * self._rng.standard_normal((2, self.cells))
+        for cell, place in enumerate(self.order):
+            state = self.plant.cell[cell].memory.state
+            self.voltages[place] = (
+                lib.plant_voltage_V(self.plant, cell, current_A) + 5e-4 * normals[0, cell]
+            )
+            self.surfaces[place] = state.surface + 5e-3 * normals[1, cell]
+        coolants = [self.plant.cell[i].memory.state.coolant for i in range(self.cells)]
+        mean_K = float(np.mean(coolants))  # one for all, whatever their order
+        return self.step(
+            current_A=current_A, coolant_in_K=mean_K, coolant_out_K=mean_K, cooling_power_W=1.0
+        )

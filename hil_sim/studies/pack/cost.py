@@ -67,7 +67,7 @@ def _instructions(
     cells: int, rising: int, pack_bytes: int, nothing: int, least: int, most: int, periods: int
 ) -> Instructions:
     def of(ticks: int) -> int:
-        return round((ticks - nothing) * TICK_NS / 2**INSTRUCTION_SHIFT)
+        return round((ticks - nothing) * TICK_NS / 2.0**INSTRUCTION_SHIFT)
 
     return Instructions(cells, bool(rising), of(least), of(most), periods, pack_bytes)
 
@@ -77,7 +77,8 @@ def host_us(cells: int, periods: int = 200, repeats: int = 25) -> float:
     preset, model = load_pair(DEFAULT_PRESET, None)
     core = Core(preset, model, NO_RESERVES)
     rng = np.random.default_rng(cells)
-    pack, kept = ffi.new("pack_t *"), []
+    pack = ffi.new("pack_t *")
+    kept: list[Any] = []  # readings point to them
     owners = ffi.new("uint8_t[]", list(range(cells)))
     config = {
         "calibration": core.calibration,

@@ -5,13 +5,8 @@ docs/pack.md has the derivation of each.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.linalg import expm
-
-from bms.arrays import Array
 from bms.barrier import barrier_constants
 from bms.barrier.margins import sampling_margins
 from bms.barrier.surface_prediction import surface_prediction
@@ -19,10 +14,12 @@ from bms.bus_signals import BUS
 from bms.cell import CellFactors, CellParameters, scaled
 from bms.errors import InputError
 from bms.presets import Preset
+from hil_sim.studies.pack.prediction import core_differences, surface_differences
 from hil_sim.studies.pack.spread import Spread, Surroundings
 
-_STEP_S = 0.5
-_SETTLED = 10.0  # time constants after which nothing is left of an impulse
+ESTIMATE_ERROR_K = 10.0
+"""Error of the core's estimate, beyond its bound, that the reversible heat is reserved for: the
+estimator knows the preset's cell only."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +104,8 @@ def _changes(
     """The core's and the voltage's condition of the worst cell, charge of the smallest."""
     own = barrier_constants(worst, preset)
     hold_s = preset.timing.sampling_period_s + preset.timing.delay_s
-    nominal_margin = float(sampling_margins(preset.cell, preset).core_K_per_s)
+    margins = [sampling_margins(cell, preset) for cell in _extremes(preset, spread)]
+    estimate_K_per_s = abs(own.a2_per_As) * -preset.limits.reference_current_A * ESTIMATE_ERROR_K
     return {
         "capacity_As": worst.capacity_As,
         "ohmic_resistance_ohm": worst.ohmic_resistance_ohm,
@@ -115,23 +113,30 @@ def _changes(
         "alpha2_per_s": own.a1_per_s,
         "a2_per_As": own.a2_per_As,
         "a3_K_per_A2s": own.a3_K_per_A2s,
-        "core_margin_K_per_s": nominal_margin
-        + own.a1_per_s * hold_s * coupling_K_per_s(preset, spread, around),
+        "voltage_margin_V": max(float(margin.voltage_V) for margin in margins),
+        "soc_margin_per_s": max(float(margin.soc_per_s) for margin in margins),
+        "core_margin_K_per_s": max(float(margin.core_K_per_s) for margin in margins)
+        + own.a1_per_s * hold_s * coupling_K_per_s(preset, spread, around)
+        + estimate_K_per_s,
     }
+
+
+def _extremes(preset: Preset, spread: Spread) -> list[CellParameters]:
+    """Cells at all corners, each with the greatest resistance and the least capacity."""
+    most = CellFactors(resistance=spread.resistance[1], capacity=spread.capacity[0])
+    return [scaled(corner, most) for corner in spread.corners(preset.cell)]
 
 
 def _bare(preset: Preset, spread: Spread, around: Surroundings) -> dict[str, float]:
     cell, sensors = preset.cell, preset.sensors
     most_W = greatest_heat_W(preset, spread)
-    other_K_per_W = _other_surface_K_per_W(preset, spread)
-    slowest_rs = cell.surface_resistance_K_per_W * spread.surface_resistance[1]
-    neighbours_W = 2.0 * around.neighbour_W_per_K * neighbour_gap_K(preset, spread)
-    # As though the coolant were uneven by all that one cell's heat makes of it.
-    uneven_K = most_W / around.flow_W_per_K
+    surface, core = surface_differences(preset, spread), core_differences(preset, spread)
     surface_K = (
-        surface_prediction(cell, preset).error_bound_K + slowest_rs * neighbours_W + uneven_K
+        surface_prediction(cell, preset).error_bound_K
+        + _neighbours_K(preset, spread, around)
+        + surface.falling_K_per_K_per_s * _falling_K_per_s(preset)
     )
-    core_K = surface_K + (other_K_per_W + _other_core_K_per_W(preset, spread)) * most_W
+    core_K = surface_K + (surface.above_K_per_W + core.above_K_per_W + core.below_K_per_W) * most_W
     strength_A = -preset.limits.reference_current_A
     entropic = abs(cell.entropic_coefficient_V_per_K)
     rc = cell.core_resistance_K_per_W * spread.core_resistance[1]
@@ -142,62 +147,35 @@ def _bare(preset: Preset, spread: Spread, around: Surroundings) -> dict[str, flo
         "voltage_error_V": sensors.voltage_V.error_bound + BUS.voltage_V,
         "current_error_A": sensors.current_A.error_bound + BUS.current_A,
         "surface_K": surface_K,
-        "surface_K_per_W": other_K_per_W,
+        "surface_K_per_W": surface.above_K_per_W,
         "estimate_K": rc * entropic * strength_A * core_K,
     }
 
 
 def _deficit_K(preset: Preset, spread: Spread, around: Surroundings) -> float:
     """By how much the surface of a cell can be below the prediction from the nominal resistance."""
-    less_W = (1.0 - spread.resistance[0]) * greatest_heat_W(preset, spread)
-    rs = preset.cell.surface_resistance_K_per_W
+    most_W = greatest_heat_W(preset, spread)
+    less_W = (1.0 - spread.resistance[0]) * most_W
+    surface = surface_differences(preset, spread)
+    return (
+        surface.below_K_per_W * most_W
+        + surface.falling_K_per_K_per_s * _falling_K_per_s(preset)
+        + preset.cell.surface_resistance_K_per_W * less_W
+        + _neighbours_K(preset, spread, around)
+    )
+
+
+def _neighbours_K(preset: Preset, spread: Spread, around: Surroundings) -> float:
+    """What two neighbours, and a coolant that is not as warm as it seems, do to a surface.
+
+    The coolant is taken to be uneven by all that one cell's heat makes of it.
+    """
+    slowest = preset.cell.surface_resistance_K_per_W * spread.surface_resistance[1]
     neighbours_W = 2.0 * around.neighbour_W_per_K * neighbour_gap_K(preset, spread)
-    uneven_K = greatest_heat_W(preset, spread) / around.flow_W_per_K
-    other_K_per_W = _differing_K_per_W(preset, spread, lambda more: np.maximum(-more[1], 0.0))
-    return other_K_per_W * greatest_heat_W(preset, spread) + rs * (less_W + neighbours_W) + uneven_K
+    return slowest * neighbours_W + greatest_heat_W(preset, spread) / around.flow_W_per_K
 
 
-def _other_surface_K_per_W(preset: Preset, spread: Spread) -> float:
-    """By how much the surface of a cell of the spread can be above the nominal prediction.
-
-    For any course of a heat between 0 and 1 W: the integral of what its impulse response is above
-    the nominal one, at the worst of the spread's corners.
-    """
-    return _differing_K_per_W(preset, spread, lambda more: np.maximum(more[1], 0.0))
-
-
-def _other_core_K_per_W(preset: Preset, spread: Spread) -> float:
-    """The same of the core, above or below."""
-    return _differing_K_per_W(preset, spread, lambda more: np.abs(more[0]))
-
-
-def _differing_K_per_W(preset: Preset, spread: Spread, counted: Callable[[Array], Array]) -> float:
-    """Integral of what counts of the corners' impulse responses less the nominal one, the worst."""
-    nominal = _impulses_K_per_J(preset.cell, preset.cell)
-    sums = (
-        np.sum(counted(_impulses_K_per_J(corner, preset.cell) - nominal))
-        for corner in spread.corners(preset.cell)
-    )
-    return _STEP_S * float(max(sums))
-
-
-def _impulses_K_per_J(cell: CellParameters, nominal: CellParameters) -> Array:
-    """Core and surface after one joule in the core, coolant held, every _STEP_S; (2, n).
-
-    The response of a step's mean: exact for heats that are constant over each step.
-    """
-    rc, cc = cell.core_resistance_K_per_W, cell.core_heat_capacity_J_per_K
-    rs, cs = cell.surface_resistance_K_per_W, cell.surface_heat_capacity_J_per_K
-    matrix = np.array(
-        [[-1.0 / (rc * cc), 1.0 / (rc * cc)], [1.0 / (rc * cs), -(1.0 / rc + 1.0 / rs) / cs]]
-    )
-    longest_s = (nominal.core_resistance_K_per_W + nominal.surface_resistance_K_per_W) * (
-        nominal.core_heat_capacity_J_per_K + nominal.surface_heat_capacity_J_per_K
-    )
-    step = expm(matrix * _STEP_S)
-    held = np.linalg.solve(matrix, (step - np.eye(2)) @ np.array([1.0 / cc, 0.0])) / _STEP_S
-    responses = np.empty((2, int(_SETTLED * longest_s / _STEP_S)))
-    for i in range(responses.shape[1]):
-        responses[:, i] = held
-        held = step @ held
-    return responses
+def _falling_K_per_s(preset: Preset) -> float:
+    """Rate at which the coolant of a cell falls at most."""
+    most_W = preset.operating_box.cooling_power_W[1]
+    return most_W / preset.cell.coolant_heat_capacity_J_per_K

@@ -113,8 +113,8 @@ def _slowest_alone_s(
 ) -> float:
     """Time of the cell that takes longest when each is charged by itself."""
     slowest_s = 0.0
-    for cell in zip(drawn.cells, drawn.states, drawn.disturbances):
-        single = PackDraw(*((member,) for member in cell))
+    for cell, state, disturbance in zip(drawn.cells, drawn.states, drawn.disturbances):
+        single = PackDraw((cell,), (state,), (disturbance,))
         charge = PackCharge(core, single, settings.around, one_cell(0), settings.max_time_s)
         play([charge], 1, rng)
         slowest_s = max(slowest_s, float(charge.fields.time_s))
