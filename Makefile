@@ -7,14 +7,16 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 BIN := .venv/bin
 RUNNER := hil_sim/studies/campaign/native
+PACK := hil_sim/studies/pack/native
 NATIVE := hil_sim/native
 RIVALS := bms/studies/rivals/native
 C_PROGRAMS := tests/firmware/native
-C_SOURCES := $(wildcard firmware_c/*/*.[ch] $(NATIVE)/*.[ch] $(RUNNER)/*.[ch] $(RIVALS)/*.[ch])
+C_SOURCES := $(wildcard firmware_c/*/*.[ch] $(NATIVE)/*.[ch] $(RUNNER)/*.[ch] $(PACK)/*.[ch] $(RIVALS)/*.[ch])
 PAGE := hil_sim/dashboard
 PAGE_SOURCES = $(wildcard $(PAGE)/native/*.[ch] $(PAGE)/web/*.* $(PAGE)/web/src/*) $(PAGE)/build.py $(PAGE)/module.py
 EXTENSION_BUILD := setup.py tools/native_extensions.py bms/native_build.py \
-  bms/studies/rivals/native_build.py hil_sim/native/native_build.py hil_sim/studies/campaign/native_build.py
+  bms/studies/rivals/native_build.py hil_sim/native/native_build.py hil_sim/studies/campaign/native_build.py \
+  hil_sim/studies/pack/native_build.py
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 PYTEST := $(BIN)/python -m pytest -n 2
 # What `make quick` tries: the C core, and of Python what is nearest to it.
@@ -112,7 +114,7 @@ docs: .venv/docs build/extensions page ## The documentation as a site in build/s
 	@echo "build/site/index.html (with search: python3 -m http.server --directory build/site)"
 
 clean: ## Remove everything that set-up, build and runs have made
-	rm -rf .venv build out *.egg-info bms/firmware/_firmware.* bms/studies/rivals/_rivals.* hil_sim/native/_native.* hil_sim/studies/campaign/_runner.* $(PAGE)/static $(PAGE)/web/node_modules
+	rm -rf .venv build out *.egg-info bms/firmware/_firmware.* bms/studies/rivals/_rivals.* hil_sim/native/_native.* hil_sim/studies/campaign/_runner.* hil_sim/studies/pack/_pack.* $(PAGE)/static $(PAGE)/web/node_modules
 
 .venv/runtime: pyproject.toml constraints.txt setup.py
 	tools/check_machine.sh "$(PYTHON)"

@@ -28,7 +28,8 @@ class BuildWithPage(build_py):
 setup(
     cmdclass={"build_py": BuildWithPage},
     cffi_modules=[
-        f"tools/native_extensions.py:{name}" for name in ("firmware", "rivals", "native", "runner")
+        f"tools/native_extensions.py:{name}"
+        for name in ("firmware", "rivals", "native", "runner", "pack")
     ],
     # cffi builds against the stable ABI; one wheel serves every Python from 3.10 on.
     options={"bdist_wheel": {"py_limited_api": "cp310"}},
