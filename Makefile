@@ -7,12 +7,16 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 BIN := .venv/bin
 RUNNER := hil_sim/studies/campaign/native
+PACK := hil_sim/studies/pack/native
 NATIVE := hil_sim/native
 RIVALS := bms/studies/rivals/native
 C_PROGRAMS := tests/firmware/native
-C_SOURCES := $(wildcard firmware_c/*/*.[ch] $(NATIVE)/*.[ch] $(RUNNER)/*.[ch] $(RIVALS)/*.[ch])
+C_SOURCES := $(wildcard firmware_c/*/*.[ch] $(NATIVE)/*.[ch] $(RUNNER)/*.[ch] $(PACK)/*.[ch] $(RIVALS)/*.[ch])
+PAGE := hil_sim/dashboard
+PAGE_SOURCES = $(wildcard $(PAGE)/native/*.[ch] $(PAGE)/web/*.* $(PAGE)/web/src/*) $(PAGE)/build.py $(PAGE)/module.py
 EXTENSION_BUILD := setup.py tools/native_extensions.py bms/native_build.py \
-  bms/studies/rivals/native_build.py hil_sim/native/native_build.py hil_sim/studies/campaign/native_build.py
+  bms/studies/rivals/native_build.py hil_sim/native/native_build.py hil_sim/studies/campaign/native_build.py \
+  hil_sim/studies/pack/native_build.py
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 PYTEST := $(BIN)/python -m pytest -n 2
 # What `make quick` tries: the C core, and of Python what is nearest to it.
@@ -21,7 +25,7 @@ QUICK_TESTS ?= $(foreach test, calibration_choice charge_mode codec codec_messag
   tests/codegen/test_generated.py $(foreach test, barrier_constants model_file presets, tests/bms/test_$(test).py) \
   $(foreach test, database plant_node replay_golden, tests/hil_sim/test_$(test).py)
 
-.PHONY: help build run quick test lint coverage misra mutants proofs generate models verify-tables long-checks fuzz fuzz-frames fuzz-logs benchmark docs clean
+.PHONY: help build run page dashboard quick test lint coverage misra mutants proofs generate models verify-tables long-checks fuzz fuzz-frames fuzz-logs benchmark docs clean
 .DEFAULT_GOAL := help
 
 help: ## List the targets
@@ -32,6 +36,11 @@ build: build/extensions ## Build the C extensions anew where their sources have 
 run: build/extensions ## Charge a cell at 10C over a CAN bus and write a report to out/run
 	$(BIN)/bms sil --mode fastest --baseline s-cbf --baseline kan-rcbf-fixed --out $(OUT)
 
+page: build/page ## Build the page of `bms dashboard` (needs Node.js with npm)
+
+dashboard: page build/extensions ## Charge a cell in a browser: serves the page on this machine
+	$(BIN)/bms dashboard
+
 quick: .venv/tests build/extensions ## Build what changed and run the quick tests of the C core and of Python near it
 	$(PYTEST) -q --dist worksteal -m "not slow" $(or $(TESTS),$(QUICK_TESTS))
 
@@ -40,6 +49,8 @@ test: .venv/tests build/extensions ## Everything that must pass: real vcan, imag
 	$(PYTEST) --dist loadfile $(TESTS)
 else
 test: .venv/tests build/extensions build/sanitized/done lint
+	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory page; \
+	  else echo "not run: the page in a browser; it needs Node.js with npm" >&2; test -z "$$CI"; fi
 	@if command -v arm-none-eabi-gcc >/dev/null && command -v qemu-system-arm >/dev/null; then \
 	  $(MAKE) --no-print-directory firmware; \
 	else \
@@ -97,12 +108,13 @@ benchmark: .venv/tests build/extensions ## Time of a control period of the ECU i
 	$(BIN)/python -m tests.firmware.native.build benchmark --out build/native
 	build/native/benchmark 50000
 
-docs: .venv/docs ## The documentation as a site in build/site; a broken link or reference fails
+docs: .venv/docs build/extensions page ## The documentation as a site in build/site; a broken link or reference fails
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --site-dir build/site
+	$(BIN)/python -m hil_sim.dashboard.site build/site/page
 	@echo "build/site/index.html (with search: python3 -m http.server --directory build/site)"
 
 clean: ## Remove everything that set-up, build and runs have made
-	rm -rf .venv build out *.egg-info bms/firmware/_firmware.* bms/studies/rivals/_rivals.* hil_sim/native/_native.* hil_sim/studies/campaign/_runner.*
+	rm -rf .venv build out *.egg-info bms/firmware/_firmware.* bms/studies/rivals/_rivals.* hil_sim/native/_native.* hil_sim/studies/campaign/_runner.* hil_sim/studies/pack/_pack.* $(PAGE)/static $(PAGE)/web/node_modules
 
 .venv/runtime: pyproject.toml constraints.txt setup.py
 	tools/check_machine.sh "$(PYTHON)"
@@ -128,6 +140,11 @@ clean: ## Remove everything that set-up, build and runs have made
 
 build/extensions: .venv/runtime $(C_SOURCES) $(EXTENSION_BUILD)
 	$(BIN)/python setup.py --quiet build_ext --inplace --parallel 2
+	@mkdir -p build && touch $@
+
+build/page: .venv/runtime $(C_SOURCES) $(PAGE_SOURCES)
+	$(INSTALL) --no-build-isolation --editable '.[dashboard,dashboard-build]'
+	$(BIN)/python -m hil_sim.dashboard.build
 	@mkdir -p build && touch $@
 
 build/sanitized/done: .venv/runtime $(C_SOURCES) $(EXTENSION_BUILD)

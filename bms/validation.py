@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Hashable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, cast
 
 from annotated_types import Ge, Gt, Lt
 from pydantic import AllowInfNan, ConfigDict, TypeAdapter, ValidationError
@@ -66,7 +68,14 @@ def refusals(kind: type[T], content: Any) -> list[Refusal]:
 
 def _validated(kind: type[T], content: Any) -> T:
     # A TOML date is no JSON value; as text it is refused where a number is wanted.
-    return TypeAdapter(kind).validate_json(json.dumps(content, allow_nan=True, default=str))
+    adapter: TypeAdapter[T] = _adapter(cast("Hashable", kind))
+    return adapter.validate_json(json.dumps(content, allow_nan=True, default=str))
+
+
+@cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    """Made once: for the faults of a run that takes longer than all else of their reading."""
+    return TypeAdapter(kind)
 
 
 def _refusals(error: ValidationError) -> list[Refusal]:

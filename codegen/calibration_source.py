@@ -9,6 +9,8 @@ from bms.tables import network_tables
 from codegen.rendering import environment, initialiser
 
 FILE_NAME = "calibration_default.c"
+CALIBRATION_FILE = "calibration.bin"
+"""The same constants and tables as a part of a flash image."""
 ROUNDING_K = 1e-12
 
 

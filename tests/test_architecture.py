@@ -36,7 +36,7 @@ def linted(tree: Path) -> subprocess.CompletedProcess[str]:
         ("codegen/rendering.py", "hil_sim.bus.closing", "hil_sim -> codegen -> bms"),
         ("bms/cell/model.py", "bms.studies.paper_fit.figures", "bms: product below"),
         ("bms/firmware/edges.py", "bms.verification.intervals", "bms: product below"),
-        ("codegen/rendering.py", "codegen.can_sources", "codegen: commands over"),
+        ("codegen/rendering.py", "codegen.can_sources", "codegen: programs over"),
         ("hil_sim/bus/buses.py", "hil_sim.run.session", "hil_sim: product below"),
         ("hil_sim/plant/plant.py", "hil_sim.logs.frame", "hil_sim: product below"),
         ("bms/cell/parameters.py", "bms.cell.model", "no circle of packages"),

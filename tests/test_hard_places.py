@@ -23,6 +23,7 @@ from bms.model.model_file import shipped_model_path
 from bms.presets.authoring.form import form
 from tests.bms.kan_samples import write_recording
 from tests.firmware.ports import built, needs_emulator
+from tests.hil_sim.dashboard_page import needs_page
 
 pytestmark = pytest.mark.slow
 
@@ -38,6 +39,7 @@ BUS = "udp_multicast:239.74.163.89"
 EXTRAS = {
     "plating": "pybamm", "optimum": "cvxpy", "compare-charges": "cvxpy", "tune": "cvxpy",
 }  # fmt: skip
+MARKS = {"flash": needs_emulator, "dashboard": needs_page}
 Started = subprocess.Popen[bytes]
 
 COMMANDS: dict[str, tuple[int, str]] = {
@@ -45,9 +47,11 @@ COMMANDS: dict[str, tuple[int, str]] = {
     "ecu": (0, f"--bus {BUS} --silence-s 1"),
     "plant": (1, f"--bus {BUS} --max-time-s 1 --answer-timeout-s 20 --out DIR/out"),
     "monitor": (0, f"--bus {BUS} --for-s 0.2"),
+    "dashboard": (0, f"--bus {BUS} --port 0 --for-s 0.2"),
     "replay": (0, "GOLDEN/message_loss.log.gz"),
     "fault-matrix": (0, "--rows once --jobs 2 --out DIR/out"),
     "campaign": (0, "--runs 2 --jobs 2 --max-time-s 5 --out DIR/out"),
+    "pack": (1, "--cells 3 --packs 2 --jobs 2 --max-time-s 5 --out DIR/out"),
     "reproduce": (0, "--max-time-s 1 --jobs 2 --out DIR/out"),
     "bench": (0, "--quick --section period"),
     "plating": (0, "--temperatures 288.15,298.15 --soc 0,0.6,1 --out DIR/map.toml"),
@@ -202,7 +206,7 @@ def test_this_user_may_write_neither_home_nor_installation(user: list[str], fold
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=needs_emulator) if name == "flash" else name
+        pytest.param(name, marks=MARKS.get(name, ()))
         for name in COMMANDS
         if name not in {"ecu", "plant"}
     ],

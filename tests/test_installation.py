@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tarfile
 import venv
+import zipfile
 from collections.abc import Iterator
 from importlib.metadata import Distribution, distribution, distributions, entry_points
 from importlib.util import find_spec
@@ -22,7 +23,11 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
+from bms.presets import DEFAULT_PRESET, load_preset
+from hil_sim.dashboard.build import STATIC
+from hil_sim.fmu.plant import PLANT_FILES, plant_unit
 from tests.firmware.ports import image, needs_compiler
+from tests.hil_sim.dashboard_page import needs_page
 
 pytestmark = pytest.mark.slow
 
@@ -170,6 +175,18 @@ def test_one_wheel_serves_every_python_from_3_10_on(wheel: Path) -> None:
     assert re.fullmatch(r"kan_rcbf_bms-[\d.]+-cp310-abi3-\w+\.whl", wheel.name)
 
 
+@needs_page
+def test_the_page_in_it_has_the_bytes_of_that_of_the_repository(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        place = f"{STATIC.relative_to(ROOT).as_posix()}/"
+        names = [name for name in archive.namelist() if name.startswith(place)]
+        page = {name.removeprefix(place): archive.read(name) for name in names}
+        assert not [name for name in archive.namelist() if "dashboard/web" in name]
+    built = {p.relative_to(STATIC).as_posix(): p for p in STATIC.rglob("*") if p.is_file()}
+    assert page == {name: path.read_bytes() for name, path in built.items()}
+    assert {"index.html", "page.wasm"} <= set(page)
+
+
 @pytest.mark.skipif(
     find_spec("abi3audit") is None and "CI" not in os.environ,
     reason="not run: abi3audit is not installed",
@@ -225,6 +242,15 @@ def test_the_sources_that_it_exports_are_those_of_the_repository(
     )
     assert written == kept
     assert (anywhere / "core" / "CMakeLists.txt").is_file()
+
+
+def test_the_units_that_it_exports_are_those_of_the_repository(
+    python: Path, anywhere: Path
+) -> None:
+    run(python.with_name("bms"), "export", "--fmu", "plant", "--out", "units", folder=anywhere)
+    preset = load_preset(DEFAULT_PRESET)
+    for version, name in PLANT_FILES.items():
+        assert (anywhere / "units" / name).read_bytes() == plant_unit(preset, version)
 
 
 @needs_compiler

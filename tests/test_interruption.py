@@ -29,6 +29,7 @@ COMMANDS = {
     "verify-tables": ("verify-tables", "--stride", 1, "--processes", 2),
     "campaign": ("campaign", "--runs", 20_000, "--jobs", 2, "--out", "out"),
     "campaign in one process": ("campaign", "--runs", 20_000, "--jobs", 1, "--out", "out"),
+    "pack": ("pack", "--packs", 5000, "--jobs", 2, "--out", "out"),
     "reproduce": ("reproduce", "--jobs", 2, "--out", "out"),
     "fault-matrix": ("fault-matrix", "--jobs", 2, "--out", "out"),
     "train": ("train", "--preset", "lin2014", "--out", "model.json"),

@@ -49,6 +49,7 @@ COMMANDS = {
     "ecu": ("ecu", "--bus", "udp_multicast:239.74.163.87", "--preset", "LOCKED.toml"),
     "plant": ("plant", "--bus", "udp_multicast:239.74.163.87", "--log", "LOCKED/run.log"),
     "monitor": ("monitor", "--bus", "udp_multicast:239.74.163.87", "--preset", "LOCKED.toml"),
+    "dashboard": ("dashboard", "--preset", "LOCKED.toml"),
     "verify": ("verify", "--preset", "LOCKED.toml"),
 }
 

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Installs Debian packages: compiler and emulator of the microcontroller ports with the word firmware, what
 # measures coverage and looks for MISRA's rules with the word gates, else all that the tests need, with
-# user-mode-linux for a real vcan0 and can-utils to read it.
+# user-mode-linux for a real vcan0, can-utils to read it and Chromium for the page.
 # On Debian as root it installs them; elsewhere it names the command, and the tests say what is not run. With
 # firmware it then fails, unless compiler and emulator are there in another way than as Debian's packages.
 set -eu
@@ -9,7 +9,7 @@ packages="gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"
 case "${1:-}" in
 firmware) ;;
 gates) packages="clang-19 llvm-19 libclang-rt-19-dev cppcheck" ;;
-*) packages="$packages g++ user-mode-linux can-utils iproute2" ;;
+*) packages="$packages g++ user-mode-linux can-utils iproute2 chromium" ;;
 esac
 missing=""
 for package in $packages; do

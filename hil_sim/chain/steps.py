@@ -27,9 +27,8 @@ from bms.verification import PARTS
 from bms.verification import verify as certify
 from bms.verification.family import FAMILY_PARTS, verify_family
 from bms.waiting import waiting
-from codegen.calibration_source import calibration_source
+from codegen.calibration_source import CALIBRATION_FILE, calibration_source
 from codegen.can_sources import can_sources
-from codegen.export import CALIBRATION_FILE
 from hil_sim.chain.state import file_hash
 from hil_sim.fault_matrix.matrix import load_matrix
 from hil_sim.fault_matrix.report import MatrixResult, matrix_json, matrix_page

@@ -61,8 +61,8 @@ PlantOption = Annotated[
     str,
     typer.Option(
         "--plant",
-        help="The cell: two-mass, pybamm:spme or pybamm:dfn (also ,contact=OHM), "
-        "recorded:CSV (also ,soc=START), or a plant of one's own; see docs/plants.md.",
+        help="The cell: two-mass, pybamm:spme or pybamm:dfn (also ,contact=OHM), recorded:CSV "
+        "(also ,soc=START), fmu:FILE (also ,NAME=ITS_NAME), or one of one's own; docs/plants.md.",
     ),
 ]
 MaxTimeOption = Annotated[

@@ -42,7 +42,8 @@ def without_times(result):
 
 
 def by_name(result, word):
-    (row,) = (row for row in result["estimators"] if word in row["name"])
+    rows = [row for row in result["estimators"] if word in row["name"]]
+    (row,) = [row for row in rows if row["name"] == word] or rows
     return row
 
 

@@ -60,7 +60,7 @@ def test_any_plausible_preset_is_certified_in_temperature(preset, error_bound_K)
 
 
 @pytest.mark.slow
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(plausible_presets(), ERROR_BOUNDS_K)
 def test_any_plausible_preset_is_certified_by_the_whole_command(preset, error_bound_K):
     result = verify(preset, model_for(preset, error_bound_K), samples=FEW_SAMPLES)

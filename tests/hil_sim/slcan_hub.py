@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from socketserver import StreamRequestHandler, ThreadingTCPServer
 from threading import Lock, Thread
 
@@ -32,6 +33,12 @@ class SlcanHub(ThreadingTCPServer):
     def __exit__(self, *error: object) -> None:
         self.shutdown()
         self.server_close()
+
+    def drop(self) -> None:
+        """Break the lines of all clients."""
+        with self._lock:
+            for client in self._clients:
+                client.request.shutdown(socket.SHUT_RDWR)
 
     def join(self, client: _Adapter) -> list[bytes]:
         with self._lock:

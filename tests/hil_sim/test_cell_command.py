@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from hil_sim.targets.catalog import find_board
 from tests.cycler_recordings import write_cycler
 from tests.firmware.ports import built, needs_emulator
 
+PROGRESS = re.compile(r"bms: .*: .*, \d+ s")
 STEPS = ["preset", "train", "verify", "charge", "faults", "export", "image"]
 
 
@@ -357,7 +359,9 @@ def test_wrong_inputs_are_refused_at_once_with_their_cause(
     bms, quick, recordings, tmp_path, words, said
 ):
     code, taken, err = call(bms, *recordings, *words, "--out", tmp_path / "out")
-    assert (code, taken, err.count("\n")) == (2, {}, 1), err
-    assert said in err
+    # A busy machine takes long enough to say how far it is.
+    told = [line for line in err.splitlines() if not PROGRESS.fullmatch(line)]
+    assert (code, taken, len(told)) == (2, {}, 1), err
+    assert said in told[0]
     assert quick == []
     assert not (tmp_path / "out" / "preset.toml").exists()

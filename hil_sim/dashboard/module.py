@@ -1,0 +1,61 @@
+"""The firmware and its plant as a WebAssembly module: sources, and how they are compiled.
+
+Imports no extension, so that it works before any is built.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+from bms.errors import InputError
+from bms.native_build import CORE_FOLDERS, CORE_HEADERS, ROOT
+
+NATIVE = "hil_sim/dashboard/native"
+_CHARGE = "hil_sim/studies/campaign/native"
+_CELL = "hil_sim/native"
+HEADERS = (
+    *CORE_HEADERS,
+    *(f"{_CELL}/{name}.h" for name in ("cell", "wire")),
+    *(f"{_CHARGE}/{name}.h" for name in ("ecu_link", "baselines", "charge")),
+    *(f"{NATIVE}/{name}.h" for name in ("normals", "session")),
+)
+"""What declares session_scenario_t, in order."""
+_FOLDERS = (*CORE_FOLDERS, _CELL, _CHARGE, NATIVE)
+_FOR_A_HOST_ONLY = ("socketcan_batch.c",)
+# As the extensions are compiled; a reactor has functions to call, and no start of its own.
+_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-s")
+_TARGET = ("-target", "wasm32-wasi", "-mexec-model=reactor")
+
+
+def sources(root: Path = ROOT) -> list[Path]:
+    """Everything that the module is compiled from."""
+    return [
+        path
+        for folder in _FOLDERS
+        for path in sorted((root / folder).glob("*.[ch]"))
+        if path.name not in _FOR_A_HOST_ONLY
+    ]
+
+
+def compile_module(path: Path, root: Path = ROOT) -> None:
+    """Write the module to a path.
+
+    Raises InputError without a compiler (ziglang from PyPI), or with what it complains of.
+    """
+    if find_spec("ziglang") is None:
+        raise InputError(
+            "no compiler for WebAssembly; get one with "
+            "\"python -m pip install 'kan-rcbf-bms[dashboard-build]'\""
+        )
+    command = (
+        *(sys.executable, "-m", "ziglang", "cc", *_TARGET, *_FLAGS),
+        *(f"-I{folder}" for folder in _FOLDERS),
+        *(str(p.relative_to(root)) for p in sources(root) if p.suffix == ".c"),
+        *("-o", str(path.resolve())),
+    )
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise InputError(f"the module of the page cannot be compiled:\n{done.stderr.strip()}")

@@ -1,0 +1,89 @@
+// What the page is given besides its own files: presets, the CAN database, rows of the fault matrix.
+
+export interface Signal {
+  name: string;
+  start: number;
+  length: number;
+  scale: number;
+  offset_steps: number;
+  lowest: number;
+  highest: number;
+}
+
+export interface Message {
+  name: string;
+  id: number;
+  length: number;
+  data_ids: number[]; // none: not protected
+  cycle_s: number;
+  signals: Signal[];
+}
+
+export interface Database {
+  messages: Message[];
+  choices: Record<string, Record<string, string>>; // by signal
+  faults: string[]; // by number
+}
+
+export interface Limits {
+  core_K: number;
+  surface_K: number;
+  voltage_V: number;
+  soc: number;
+  completion_soc: number;
+  reference_A: number;
+}
+
+export interface Range {
+  low: number;
+  high: number;
+}
+
+export interface PresetData {
+  name: string;
+  description: string;
+  preset_hash: string;
+  model_hash: string;
+  scenario: string; // session_scenario_t, base64
+  period_s: number;
+  limits: Limits;
+  initial: { soc: number; temperature_K: number; cooling_power_W: number };
+  temperature_K: Range; // of a start
+  cooling_power_W: Range;
+  is_family: boolean;
+  permitted_A: number; // by which the measured current may miss the command
+  growth_A: number; // of the current in a period
+}
+
+export type FaultData = { kind: string; for_periods?: number } & Record<string, string | number>;
+
+export interface Row {
+  name: string;
+  group: string;
+  fault: FaultData;
+  expect: {
+    reaction: "stops" | "resumes" | "restrains" | "rides-through";
+    deadline_periods: number | null;
+    resumes_periods: number | null;
+    latches: string | null;
+    latch_deadline_periods: number | null;
+    state: string;
+  };
+  after_periods: number;
+  needs: string[];
+  note: string;
+  start: { soc: number; temperature_K: number; cooling_power_W: number; onset: number };
+}
+
+export interface Config {
+  bus: string | null; // that is shown live
+  presets: string[]; // the first is the one to begin with
+}
+
+export async function fetchData<T>(path: string): Promise<T> {
+  const response = await fetch(path);
+  if (!response.ok) {
+    throw new Error(`${path}: the server answers ${response.status}; reload the page`);
+  }
+  return (await response.json()) as T;
+}

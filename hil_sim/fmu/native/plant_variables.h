@@ -1,0 +1,34 @@
+/* References of the plant's variables, as its model descriptions have them. */
+#ifndef PLANT_VARIABLES_H
+#define PLANT_VARIABLES_H
+
+enum {
+    PLANT_TIME_s,
+    PLANT_CURRENT_A,
+    PLANT_FULL_COOLING_POWER_W,
+    PLANT_VOLTAGE_V,
+    PLANT_SURFACE_TEMPERATURE_K,
+    PLANT_CORE_TEMPERATURE_K,
+    PLANT_COOLANT_TEMPERATURE_K,
+    PLANT_SOC,
+    PLANT_COOLING_POWER_W,
+    PLANT_INITIAL_SOC,
+    PLANT_INITIAL_TEMPERATURE_K,
+    PLANT_COOLANT_FLOOR_K,
+    PLANT_CAPACITY_Ah,
+    PLANT_OHMIC_RESISTANCE_ohm,
+    PLANT_ENTROPIC_COEFFICIENT_V_per_K,
+    PLANT_RESISTANCE_FACTOR,
+    PLANT_CORE_RESISTANCE_K_per_W, /* from here: what the map of a sub-step depends on */
+    PLANT_CORE_HEAT_CAPACITY_J_per_K,
+    PLANT_SURFACE_RESISTANCE_K_per_W,
+    PLANT_SURFACE_HEAT_CAPACITY_J_per_K,
+    PLANT_COOLANT_HEAT_CAPACITY_J_per_K,
+    PLANT_BRANCH_RESISTANCE_ohm, /* of each branch a resistance and a time constant in turn */
+    PLANT_BRANCH_TIME_CONSTANT_s,
+    PLANT_VARIABLES = PLANT_BRANCH_RESISTANCE_ohm + 6 /* CELL_MAX_BRANCHES of them */
+};
+
+#define PLANT_FIRST_PARAMETER PLANT_INITIAL_SOC
+
+#endif

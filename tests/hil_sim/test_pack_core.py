@@ -1,0 +1,189 @@
+"""The pack's current lies in every cell's own interval, and is the end of the weakest one's."""
+
+import math
+
+import pytest
+
+from bms.cell import CellFactors
+from hil_sim.studies.pack._pack import ffi, lib
+from hil_sim.studies.pack.engine import NO_CELL, NO_THERMISTOR
+from tests.hil_sim.pack_rig import CHARGING, PackLoop, core_of, ordinary
+
+FAULT, COMPLETE = 5, 4
+VOLTAGE, CORE = 1, 3  # rcbf_active_t
+HOT_K = {"paper_calibrated": 315.0, "lin2014": 318.0, "a123_26650_10C": 314.0}
+PRESETS = tuple(HOT_K)
+BARE = ordinary("paper_calibrated").bare
+
+
+def loop_of(preset, worse=(), cells=5, **start):
+    """A charge of cells of which some have more resistance."""
+    factors = [CellFactors(resistance=1.1 if i in worse else 1.0) for i in range(cells)]
+    return PackLoop(core_of(preset), factors, **start)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_current_is_in_the_interval_of_each_cell_by_itself(preset):
+    loop = loop_of(preset, worse=(1, 3), temperature_K=HOT_K[preset])
+    limited = 0
+    for _ in range(600):
+        command = loop.run(1)[0]
+        limited += loop.pack.decision.cell != NO_CELL
+        for cell in range(5):
+            own = loop.own_decision(cell, command)
+            assert own.feasible
+            assert own.current_A == pytest.approx(command, rel=1e-6), cell
+    assert limited > 100
+
+
+@pytest.mark.parametrize("worst", [0, 2, 4])
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_cell_that_heats_most_governs_and_is_named(preset, worst):
+    loop = loop_of(preset, worse=(worst,), temperature_K=HOT_K[preset])
+    named = 0
+    for _ in range(600):
+        command = loop.run(1)[0]
+        named += loop.pack.decision.cell == worst and loop.decision.active in (VOLTAGE, CORE)
+    assert named > 100
+    assert loop.pack.decision.cell == worst
+    # Each cell by itself, asked for more: the worst one gives what the pack was given, or less by
+    # what keeps the noise out of it, and the others leave more.
+    alone_A = [loop.own_decision(cell, command - 2.0).current_A for cell in range(5)]
+    assert alone_A[worst] == pytest.approx(command, abs=0.7)
+    assert all(other < alone_A[worst] - 0.5 for i, other in enumerate(alone_A) if i != worst)
+
+
+def test_without_a_limit_no_cell_is_named():
+    loop = loop_of("paper_calibrated", temperature_K=285.0)
+    loop.run(5)
+    assert (loop.pack.decision.cell, loop.decision.active) == (NO_CELL, 0)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_order_of_the_cells_does_not_matter(preset):
+    commands = [
+        loop_of(preset, worse=(4,), temperature_K=HOT_K[preset], order=order).run(400)
+        for order in ([0, 1, 2, 3, 4], [3, 4, 0, 1, 2])
+    ]
+    # A family's cell takes a weaker reference for what may flow until the next decision.
+    assert commands[0] == pytest.approx(commands[1], rel=1e-3)
+    assert min(commands[0]) < -10.0
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("broken", [math.nan, math.inf])
+@pytest.mark.parametrize(
+    "reading",
+    ["current_A", "coolant_in_K", "coolant_out_K", "cooling_power_W", "voltages", "surfaces"],
+)
+def test_a_reading_of_any_cell_that_is_none_allows_no_current_in_its_period(
+    preset, reading, broken
+):
+    for cell in (0, 3):
+        rig = loop_of(preset, cells=4)
+        assert rig.run(20)[-1] < 0.0
+        current = rig.pack.command_A
+        if reading in ("voltages", "surfaces"):
+            getattr(rig, reading)[cell] = broken
+            assert rig.step(current_A=current) == 0.0
+            assert rig.pack.symptom_cell == cell
+        else:
+            assert rig.step(**{"current_A": current, reading: broken}) == 0.0
+
+
+def test_a_reading_that_comes_back_lets_the_charge_go_on_and_one_that_stays_out_is_a_fault():
+    rig = loop_of("paper_calibrated", cells=4)
+    rig.run(20)
+    good = rig.voltages[2]
+    rig.voltages[2] = math.nan
+    rig.step(2, current_A=0.0)
+    rig.voltages[2] = good
+    rig.step(1, current_A=0.0)
+    assert rig.pack.state in CHARGING
+    assert rig.pack.command_A < 0.0
+    rig.voltages[2] = math.nan
+    rig.step(3, current_A=0.0)
+    assert rig.pack.state == FAULT
+
+
+def test_the_pack_is_full_when_its_fullest_cell_is():
+    loop = PackLoop(
+        core_of("paper_calibrated"), [CellFactors()] * 3, soc=0.985, temperature_K=300.0
+    )
+    for index, soc in enumerate((0.3, 0.985, 0.5)):
+        soc_set(loop, index, soc)
+    counted = []
+    while loop.pack.state in CHARGING and len(counted) < 600:
+        loop.run(1)
+        counted.append(loop.pack.cell[1].soc.soc)
+    assert loop.pack.state == COMPLETE
+    assert loop.pack.command_A == 0.0
+    assert counted[-1] >= 0.99 > counted[-2]
+    spread = lib.pack_soc_spread(loop.pack)
+    assert spread.low == pytest.approx(loop.pack.cell[0].soc.soc) and spread.low < 0.35
+    assert spread.high == pytest.approx(counted[-1])
+
+
+def soc_set(loop, index, soc):
+    """The cell has this state of charge, and the core knows it."""
+    loop.plant.cell[index].memory.state.soc = soc
+    counter = ffi.addressof(loop.pack.cell[index], "soc")
+    lib.soc_set(counter, soc)
+
+
+@pytest.mark.parametrize(
+    ("cells", "map_", "thermistors"),
+    [
+        (0, [], 0),
+        (193, [NO_THERMISTOR] * 193, 1),
+        (2, [0, 0], 1),  # two cells by one thermistor
+        (2, [0, 2], 2),  # a thermistor that is none
+        (2, [NO_THERMISTOR] * 2, 0),  # nothing is measured
+    ],
+)
+def test_a_pack_that_cannot_be_is_refused_for_good(cells, map_, thermistors):
+    assert state_of("paper_calibrated", BARE, cells, map_, thermistors) == FAULT
+
+
+@pytest.mark.parametrize(
+    ("preset", "bare", "state"),
+    [
+        ("paper_calibrated", BARE, 0),
+        ("paper_calibrated", BARE | {"surface_K": math.nan}, FAULT),
+        ("paper_calibrated", BARE | {"resistance_factor": 0.0}, FAULT),
+        ("a123_26650_10C", BARE, FAULT),  # a family needs them all
+    ],
+)
+def test_a_cell_without_a_thermistor_needs_constants_and_no_family(preset, bare, state):
+    assert (state_of(preset, bare, 2, [0, NO_THERMISTOR], 1) == FAULT) == (state == FAULT)
+
+
+def state_of(preset, bare, cells, map_, thermistors):
+    """State after a first period with readings of the preset's start."""
+    core = core_of(preset)
+    pack = ffi.new("pack_t *")
+    config = {
+        "calibration": core.calibration,
+        "cells": cells,
+        "thermistors": thermistors,
+        "thermistor_of": ffi.new("uint8_t[]", map_ or [0]),
+        "bare": bare,
+    }
+    lib.pack_init(pack, ffi.new("pack_config_t *", config))
+    start = core.preset.initial
+    many = max(cells, 1)
+    arrays = [
+        ffi.new("float[]", [value] * many)
+        for value in (core.preset.cell.ocv(start.soc), start.temperature_K, start.soc)
+    ]
+    readings = {
+        "voltage_V": arrays[0],
+        "surface_temperature_K": arrays[1],
+        "plug_in_soc": arrays[2],
+        "coolant_in_K": start.temperature_K,
+        "coolant_out_K": start.temperature_K,
+        "cooling_power_W": start.cooling_power_W,
+    }
+    lib.pack_step(pack, ffi.new("pack_readings_t *", readings))
+    assert pack.command_A == 0.0
+    return pack.state
