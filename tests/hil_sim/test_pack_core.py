@@ -162,11 +162,12 @@ def state_of(preset, bare, cells, map_, thermistors):
     """State after a first period with readings of the preset's start."""
     core = core_of(preset)
     pack = ffi.new("pack_t *")
+    kept_map = ffi.new("uint8_t[]", map_ or [0])
     config = {
         "calibration": core.calibration,
         "cells": cells,
         "thermistors": thermistors,
-        "thermistor_of": ffi.new("uint8_t[]", map_ or [0]),
+        "thermistor_of": kept_map,
         "bare": bare,
     }
     lib.pack_init(pack, ffi.new("pack_config_t *", config))
