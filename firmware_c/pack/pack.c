@@ -144,12 +144,15 @@ static uint32_t update_cells(pack_t *pack, const pack_readings_t *readings)
 
 static bool request_is_possible(const pack_t *pack, const pack_readings_t *readings)
 {
+    if (!readings->charge) {
+        return true;
+    }
     bool is_possible = readings->reference_current_A <= 0.0f;
     for (uint32_t i = 0u; i < pack->cells; i++) {
         is_possible = is_possible && numeric_is_within(readings->plug_in_soc[i], 0.0f,
                                                        pack->calibration->rcbf.max_soc);
     }
-    return !readings->charge || is_possible;
+    return is_possible;
 }
 
 static bool is_settling(const pack_t *pack)

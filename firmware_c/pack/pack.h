@@ -63,7 +63,7 @@ typedef struct {
     float cooling_power_W; /* of one cell, in the mean */
     bool charge;           /* asked for */
     float reference_current_A;
-    const float *plug_in_soc; /* of each cell; read where a charge begins */
+    const float *plug_in_soc; /* of each cell; read where a charge is asked for */
 } pack_readings_t;
 
 typedef struct {

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from bms.cell import CellState, Disturbance, scaled
+from bms.errors import InputError
 from bms.model.pair import load_pair
 from hil_sim.run.workforce import InlineExecutor, Workforce
 from hil_sim.studies.pack.engine import Core, PackCharge, View, play
+from hil_sim.studies.pack.prediction import core_differences, surface_differences
 from hil_sim.studies.pack.reserves import Reserves, reserves
 from hil_sim.studies.pack.settings import PackSettings
 from hil_sim.studies.pack.spread import PackDraw, Spread, Surroundings
@@ -73,7 +75,7 @@ def test_the_coupling_is_beyond_the_presets_bound_and_within_the_reserve(rows):
 
 
 def test_a_pack_depends_on_seed_and_number_only():
-    few = replace(SETTINGS, cells=2, packs=6, max_time_s=30.0)
+    few = replace(SETTINGS, cells=2, packs=6, max_time_s=10.0)
     rows = run_packs(few, range(6))
     done = []
     assert run_study(few, Workforce(InlineExecutor(), 2), done.append) == rows
@@ -149,3 +151,32 @@ def test_without_its_reserves_the_bound_of_a_cell_without_a_thermistor_is_broken
         "resistance_factor": 1.0,
     }
     assert worst_corner_gap_K(nothing) > 0.3
+
+
+def test_cells_within_the_spread_differ_less_from_the_prediction_than_its_corners():
+    spread = Spread()
+    rng = np.random.default_rng(4)
+    for of in (surface_differences, core_differences):
+        corners = of(PRESET, spread)
+        for _ in range(4):
+            f = spread.factors(rng)
+            ends = (f.core_resistance, f.core_heat_capacity, f.surface_resistance)
+            inside = Spread(*((end, end) for end in ends))
+            one = of(PRESET, inside)
+            assert one.above_K_per_W <= corners.above_K_per_W
+            assert one.below_K_per_W <= corners.below_K_per_W
+            assert one.falling_K_per_K_per_s <= corners.falling_K_per_K_per_s
+
+
+def test_a_familys_pack_keeps_the_limits_that_one_cell_alone_lets_others_cross():
+    preset, model = load_pair("a123_26650_10C", None)
+    settings = PackSettings(preset, model, cells=4, packs=1, max_time_s=4000.0)
+    summary = summarise(settings, run_packs(settings, [1]))
+    assert claim_holds(summary)
+    assert set(summary["controllers"]) == {WEAKEST, ONE_CELL, MEAN}
+    assert summary["controllers"][ONE_CELL]["cells_over"] > 0
+
+
+def test_gains_at_which_the_cores_condition_is_not_invariant_are_refused():
+    with pytest.raises(InputError, match=r"lin2014.*alpha2_per_s is not 1/\(Rc Cc\)"):
+        reserves(load_pair("lin2014", None)[0], Spread(), Surroundings())

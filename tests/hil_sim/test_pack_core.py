@@ -10,7 +10,7 @@ from hil_sim.studies.pack.engine import NO_CELL, NO_THERMISTOR
 from tests.hil_sim.pack_rig import CHARGING, PackLoop, core_of, ordinary
 
 FAULT, COMPLETE = 5, 4
-VOLTAGE, CORE = 1, 3  # rcbf_active_t
+VOLTAGE, CORE, INFEASIBLE = 1, 3, 5  # rcbf_active_t
 HOT_K = {"paper_calibrated": 315.0, "lin2014": 318.0, "a123_26650_10C": 314.0}
 PRESETS = tuple(HOT_K)
 BARE = ordinary("paper_calibrated").bare
@@ -162,11 +162,12 @@ def state_of(preset, bare, cells, map_, thermistors):
     """State after a first period with readings of the preset's start."""
     core = core_of(preset)
     pack = ffi.new("pack_t *")
+    kept_map = ffi.new("uint8_t[]", map_ or [0])
     config = {
         "calibration": core.calibration,
         "cells": cells,
         "thermistors": thermistors,
-        "thermistor_of": ffi.new("uint8_t[]", map_ or [0]),
+        "thermistor_of": kept_map,
         "bare": bare,
     }
     lib.pack_init(pack, ffi.new("pack_config_t *", config))
@@ -187,3 +188,15 @@ def state_of(preset, bare, cells, map_, thermistors):
     lib.pack_step(pack, ffi.new("pack_readings_t *", readings))
     assert pack.command_A == 0.0
     return pack.state
+
+
+def test_the_first_cell_that_admits_no_current_refuses_it_for_all_and_is_named():
+    loop = loop_of("paper_calibrated", temperature_K=HOT_K["paper_calibrated"])
+    loop.run(300)
+    limit_K = loop.core.preset.limits.max_core_temperature_K
+    for cell in (1, 3):
+        state = loop.plant.cell[cell].memory.state
+        state.surface, state.core = limit_K + 2.0, limit_K + 2.0
+    assert loop.run(1) == [0.0]
+    assert not loop.decision.feasible
+    assert (loop.decision.active, loop.pack.decision.cell) == (INFEASIBLE, 1)

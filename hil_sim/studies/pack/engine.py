@@ -82,6 +82,7 @@ class PackCharge:
     ) -> None:
         preset = core.preset
         step_s = preset.timing.sampling_period_s / SUB_STEPS
+        self._core = core  # C points to its calibration
         self._count = len(pack.cells)
         self._cells = ffi.new(
             "plant_cell_t[]",
@@ -130,13 +131,14 @@ class PackCharge:
                 "plug_in_soc": self._socs,
             },
         )
+        kept_map = ffi.new("uint8_t[]", thermistor_of)  # until pack_init has read it
         config = ffi.new(
             "pack_config_t *",
             {
                 "calibration": core.calibration,
                 "cells": seen,
                 "thermistors": len(owners),
-                "thermistor_of": ffi.new("uint8_t[]", thermistor_of),
+                "thermistor_of": kept_map,
                 "bare": core.reserves.bare,
             },
         )

@@ -10,6 +10,7 @@ import numpy as np
 
 from bms.arrays import Array
 from hil_sim.run.workforce import Workforce
+from hil_sim.studies.campaign.real_summary import OVERFILLED_SOC
 from hil_sim.studies.pack.engine import (
     Core,
     PackCharge,
@@ -78,11 +79,14 @@ def run_study(
 
 
 def limits_of(settings: PackSettings) -> Array:
-    """Limits of what PackCharge.peaks gives of each cell."""
+    """Limits of what PackCharge.peaks gives of each cell.
+
+    A family's cell is full by its voltage; it is overfilled where a campaign says so too.
+    """
     limits = settings.preset.limits
     return np.array(
         [
-            limits.max_soc,
+            OVERFILLED_SOC if settings.is_family else limits.max_soc,
             limits.max_core_temperature_K,
             limits.max_surface_temperature_K,
             limits.max_voltage_V,
