@@ -98,7 +98,7 @@ def test_the_readme_s_first_screen_has_picture_two_commands_and_a_link_for_each_
     assert re.findall(r"^(?:make|bms) \S+", first, re.MULTILINE) == ["make run", "make test"]
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     readers = re.findall(r"docs/index\.md#([a-z-]+)", first)
-    assert len(readers) == 4
+    assert len(readers) == 5
     assert set(readers) <= {
         heading.lower().replace(" ", "-")
         for heading in re.findall(r"^## (.+)$", index, re.MULTILINE)
