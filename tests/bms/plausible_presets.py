@@ -162,12 +162,15 @@ def plausible_presets(draw: st.DrawFn) -> Preset:
     first = alpha4 * draw(st.floats(0.02, 0.98))
     bound = _between(5e-5, 5e-3)
     own_gain = 1.0 / (cell.core_resistance_K_per_W * core_J_per_K)
+    period_s = draw(st.sampled_from([0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0]))
+    # A steeper ramp would hide a wrong current, and is refused.
+    growth_per_s = draw(_between(0.02, min(1.0, 0.124 / period_s)))
     cooling_W = draw(st.floats(0.2, 1.0)) * cell.ohmic_resistance_ohm * current_A**2
     return Preset(
         "drawn", "", (), cell,
         Limits(
             float(ocv(max_soc)) + draw(st.floats(-0.1, 0.15)),
-            max_soc, core_K, surface_K, current_A, -current_A * draw(_between(0.02, 1.0)),
+            max_soc, core_K, surface_K, current_A, -current_A * growth_per_s,
             max_soc * draw(st.sampled_from([1.0, 0.99, 0.9])),
         ),
         Gains(
@@ -179,7 +182,7 @@ def plausible_presets(draw: st.DrawFn) -> Preset:
             draw(_between(5e-3, 0.3)),
         ),
         Timing(
-            draw(st.sampled_from([0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0])),
+            period_s,
             draw(st.sampled_from([0.0, 0.05, 0.1, 0.5])),
         ),
         draw(_sensors(capacity_Ah)),

@@ -170,10 +170,9 @@ def test_networks_are_trained_on_a_plant_that_no_preset_describes(bms):
     assert "warning" not in err
     assert "free-convection" in result["data"]
     assert [row["name"] for row in result["estimators"]][:2] == ["KAN", "lagged KAN"]
-    quadratic = by_name(result, "quadratic least squares (lagged inputs)")
     ignorant = by_name(result, "steady gain")
-    assert ignorant["given"] == "the cell, its cooling linear"
-    assert ignorant["errors"]["all"]["rmse_K"] > 0.05 > quadratic["errors"]["all"]["rmse_K"]
+    assert ignorant["given"] == "the cell as its model has it"
+    assert 0.05 < ignorant["errors"]["all"]["rmse_K"] < 1.0
 
 
 @pytest.mark.parametrize(

@@ -69,4 +69,4 @@ def test_its_argument_is_checked_by_itself(site: Path) -> None:
 def test_without_the_package_its_name_is_unknown() -> None:
     code, printed, error = charged("own-cell:0.009")
     assert (code, printed, error.count("\n")) == (2, "", 1)
-    assert "no plant 'own-cell'; take one of two-mass, pybamm, recorded, or install" in error
+    assert "no plant 'own-cell'; take one of two-mass, pybamm, recorded, fmu, or install" in error

@@ -97,3 +97,16 @@ def test_what_the_firmware_would_not_take_is_told_before_anything_is_trained(key
     assert [one.key for one in complaints(path)] == [key]
     with pytest.raises(InputError):
         calibration_part(*settings_of(edited))
+
+
+def test_a_ramp_that_would_hide_a_quarter_of_the_current_is_refused():
+    """The charger is a step behind, so the deviation that is permitted grows with the ramp."""
+    preset = load_preset("paper_calibrated")
+    most_A_per_s = 23.0 / 8.0 / preset.timing.sampling_period_s
+    taken, refused = (
+        replace(preset, limits=replace(preset.limits, current_growth_A_per_s=one_A_per_s))
+        for one_A_per_s in (most_A_per_s, 1.001 * most_A_per_s)
+    )
+    assert plausibility_fields(taken)["current_deviation_A"] == pytest.approx(23.0 / 4.0)
+    with pytest.raises(InputError, match=r"limits.current_growth_A_per_s: .*at most 28.75"):
+        plausibility_fields(refused)
