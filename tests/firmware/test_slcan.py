@@ -101,6 +101,8 @@ def test_a_closed_channel_carries_nothing(library: tuple[Any, Any]) -> None:
         (b"N\r", b"N0000\r"),
         (b"F\r", b"F00\r"),
         (b"Z1\r", b"\r"),
+        (b"S6\r", b"\r"),
+        (b"s031C\r", b"\r"),
         (b"L\r", b"\r"),
         (b"\r", b""),
     ],
