@@ -74,8 +74,8 @@ def with_value(path: str, value: float) -> dict[str, Any]:
 
 @pytest.mark.parametrize("path", BOUNDS)
 def test_each_input_is_taken_up_to_its_bounds_and_not_beyond(path: str) -> None:
-    k = Ecu("lin2014")._calibration.rcbf
-    k = ffi.new("rcbf_constants_t *", k)
+    calibration = Ecu("lin2014")._calibration  # has the constants in it, so must stay
+    k = ffi.new("rcbf_constants_t *", calibration.rcbf)
     for bound, beyond in zip(BOUNDS[path], (-math.inf, math.inf)):
         at = np.float32(bound)
         assert solve(k, with_value(path, float(at))).active != lib.RCBF_INVALID
