@@ -55,12 +55,10 @@ def model_for_preset(
         for split in splits
     }
     samples = {split: joined(kinds.values()) for split, kinds in data.items()}
-    box = preset.operating_box.ranges()
-    ranges = (*box, *_box(samples["training"].inputs[:, len(box) :]))
-    network = train_network(
+    network = network_for_preset(
+        preset,
         samples["training"],
         samples["validation"],
-        ranges,
         settings,
         part(progress, 0.0, _SHARE_OF_TRAINING),
     )
@@ -94,6 +92,22 @@ def model_for_preset(
         bounds,
         preset,
     )
+
+
+def network_for_preset(
+    preset: Preset,
+    training: Samples,
+    validation: Samples,
+    settings: TrainingSettings,
+    progress: Progress,
+) -> Network:
+    """Network for the preset's operating box; lagged inputs get a tenth more than they span.
+
+    Raises InputError when the width does not fit the inputs.
+    """
+    box = preset.operating_box.ranges()
+    ranges = (*box, *_box(training.inputs[:, len(box) :]))
+    return train_network(training, validation, ranges, settings, progress)
 
 
 def model_for_measurements(path: Path, settings: TrainingSettings, progress: Progress) -> KanModel:

@@ -6,8 +6,7 @@ from bms.data.cooling import Cooling
 from bms.data.datasets import simulated_split
 from bms.data.simulate import joined
 from bms.kan.settings import TrainingSettings
-from bms.kan.training import train_network
-from bms.model.make import finished_model
+from bms.model.make import finished_model, network_for_preset
 from bms.model.model_file import KanModel, TrainingRecord
 from bms.presets import Preset
 from bms.progress import Progress
@@ -29,11 +28,7 @@ def trained_on(
         joined(simulated_split(preset, name, settings.seed, count, settings.lags, cooling).values())
         for name in ("training", "validation")
     )
-    lagged = training.inputs[:, len(preset.operating_box.ranges()) :]
-    reach = [(float(low), float(high)) for low, high in zip(lagged.min(axis=0), lagged.max(axis=0))]
-    network = train_network(
-        training, validation, (*preset.operating_box.ranges(), *reach), settings, progress
-    )
+    network = network_for_preset(preset, training, validation, settings, progress)
     data = f"simulated from preset {preset.name}, cooling {cooling.value}"
     record = TrainingRecord(settings, data, None, {})
     return finished_model(network, record, {}, {}, None, None)
