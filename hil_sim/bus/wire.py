@@ -25,7 +25,7 @@ class Publisher:
     """Frames of several messages, each with the next counter of its own."""
 
     def __init__(self, codecs: Sequence[MessageCodec]) -> None:
-        self._wire = ffi.new("wire_t *", _wire_fields(codecs))
+        self._wire = ffi.new("wire_t *", wire_fields(codecs))
         self._values = ffi.new("double[]", sum(len(codec.signals) for codec in codecs))
         self._frames = ffi.new("can_frame_t[]", len(codecs))
         self._bytes = ffi.buffer(self._frames)
@@ -52,7 +52,7 @@ class Listener:
         self.places = {name: place for place, name in enumerate(names)}
         """Where the value of each signal stands."""
         self._count = len(names)
-        self._wire = ffi.new("wire_t *", _wire_fields(codecs))
+        self._wire = ffi.new("wire_t *", wire_fields(codecs))
         self._values = ffi.new("double[]", self._count)
         self._unknown = [_NAN] * self._count
 
@@ -76,7 +76,7 @@ class Decoder:
     """One message, judged by somebody else: whether a payload is intact, and its values."""
 
     def __init__(self, codec: MessageCodec) -> None:
-        self._message = ffi.new("wire_message_t *", _message_fields(codec))
+        self._message = ffi.new("wire_message_t *", message_fields(codec))
         self._values = ffi.new("double[]", len(codec.signals))
         self._count = len(codec.signals)
 
@@ -91,11 +91,13 @@ class Decoder:
         return values
 
 
-def _wire_fields(codecs: Sequence[MessageCodec]) -> dict[str, Any]:
-    return {"messages": len(codecs), "message": [_message_fields(codec) for codec in codecs]}
+def wire_fields(codecs: Sequence[MessageCodec]) -> dict[str, Any]:
+    """Content of the C structure of messages that are sent together."""
+    return {"messages": len(codecs), "message": [message_fields(codec) for codec in codecs]}
 
 
-def _message_fields(codec: MessageCodec) -> dict[str, Any]:
+def message_fields(codec: MessageCodec) -> dict[str, Any]:
+    """Content of the C structure of a message."""
     return {
         "id": codec.frame_id,
         "length": codec.length,

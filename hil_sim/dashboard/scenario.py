@@ -6,7 +6,6 @@ The structure has no pointers, and its members lie as they do on a 64-bit host.
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 from cffi import FFI
 
@@ -16,22 +15,17 @@ from bms.model.model_file import KanModel
 from bms.native_build import ROOT, declarations
 from bms.presets import Preset
 from hil_sim.bus.catalog import Message
-from hil_sim.bus.database import MessageCodec, load_codecs
+from hil_sim.bus.database import load_codecs
+from hil_sim.bus.wire import message_fields, wire_fields
 from hil_sim.dashboard.module import HEADERS
 from hil_sim.dashboard.ziggurat import ziggurat_tables
+from hil_sim.nodes.plant import PUBLISHED
 from hil_sim.plant.charger import Charger
 from hil_sim.plant.sensors import Readings
 from hil_sim.studies.campaign._runner import ffi as runner
 from hil_sim.studies.campaign.engine import Scenario
 from hil_sim.studies.campaign.settings import CampaignSettings
 
-_PUBLISHED = (
-    Message.CELL_ELECTRICAL,
-    Message.CELL_THERMAL,
-    Message.COOLANT,
-    Message.CHARGE_REQUEST,
-    Message.CHARGE_MODE,
-)
 _COMMAND_SIGNAL = "CommandCurrent"
 
 
@@ -45,11 +39,8 @@ def scenario_bytes(preset: Preset, model: KanModel) -> bytes:
     scenario = ffi.new(
         "session_scenario_t *",
         {
-            "published": {
-                "messages": len(_PUBLISHED),
-                "message": [_message(codecs[name]) for name in _PUBLISHED],
-            },
-            "command": _message(command),
+            "published": wire_fields([codecs[name] for name in PUBLISHED]),
+            "command": message_fields(command),
             "normals": ziggurat_tables(),
             "bias": [getattr(preset.sensors, name).bias for name in Readings._fields],
             "calibration_content": calibration_content(preset, model),
@@ -67,15 +58,3 @@ def _layout() -> FFI:
     layout = FFI()
     layout.cdef("\n".join(declarations(ROOT / header) for header in HEADERS))
     return layout
-
-
-def _message(codec: MessageCodec) -> dict[str, Any]:
-    names = ("start", "length", "scale", "offset_steps", "lowest", "highest")
-    return {
-        "id": codec.frame_id,
-        "length": codec.length,
-        "is_protected": bool(codec.data_ids),
-        "data_ids": list(codec.data_ids),
-        "signals": len(codec.signals),
-        "signal": [{name: getattr(s, name) for name in names} for s in codec.signals],
-    }

@@ -24,7 +24,7 @@ from hil_sim.plant.sensors import Readings
 
 CONNECT_ATTEMPTS = 10
 
-_PUBLISHED = (
+PUBLISHED = (
     Message.CELL_ELECTRICAL,
     Message.CELL_THERMAL,
     Message.COOLANT,
@@ -133,7 +133,7 @@ class PlantNode:
         self._sent, self._heard = sent, heard
         self._turn = turn
         self._recorder = recorder
-        self._publisher = Publisher([database[name] for name in _PUBLISHED])
+        self._publisher = Publisher([database[name] for name in PUBLISHED])
         self._sync = Frame(database[Message.SYNC].frame_id, b"")
         self._listener = Listener([database[name] for name in _REPORTS])
         self._identity = database[Message.IDENTITY]
@@ -271,7 +271,7 @@ class PlantNode:
             request.reference_current_A,
             request.plug_in_soc,
         ]
-        messages = len(_PUBLISHED) - 1
+        messages = len(PUBLISHED) - 1
         if request.mode is not None:
             values += [request.mode, request.time_to_full_s]
             messages += 1
