@@ -1,6 +1,6 @@
 """Branch and MC/DC coverage of the C core by the selected tests, held against a record.
 
-    python -m tools.gates.coverage [--out FOLDER] [--keep]
+    python -m tools.gates.coverage [--out FOLDER]
 
 clang counts both ways of every branch and, of every decision with several conditions, which of
 them changed the outcome on their own. tools/gates/coverage.toml has the tests, the least shares,

@@ -188,7 +188,12 @@ def main() -> int:
     ]
     again = dict.fromkeys(wanted, NO_KEYS)
     if arguments.survivors:
-        again = {s: frozenset(entry["survivors"]) for s, entry in found.items()}
+        # Of a source that has changed since, nothing is known of the others any more.
+        again = {
+            source: frozenset(entry["survivors"])
+            for source, entry in found.items()
+            if entry["sha256"] == sources_hash(source)
+        }
         wanted = [source for source in again if again[source]]
     wanted.sort(key=plan.number, reverse=True)
     prepare()
