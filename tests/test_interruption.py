@@ -148,7 +148,7 @@ def child_of(pid):
 
 
 def has_ended(pid):
-    """Whether a process ends in time. Nothing may collect it where its parent has gone before it."""
+    """Whether a process ends in time. Nothing may collect it where its parent has gone before."""
     stat = Path(f"/proc/{pid}/stat")
     limit_s = time.monotonic() + START_S
     while time.monotonic() < limit_s:

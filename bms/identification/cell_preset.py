@@ -37,6 +37,8 @@ _BOX_ABOVE_K, _BOX_BELOW_K, _COOLANT_BELOW_K = 3.0, 0.5, 10.0
 _MOST_COOLING_W = math.floor(0.9 * RANGES.cooling_power_W[1])
 _OCV_SLOPE_BEYOND_V = 2.0
 """At least, where a slow recording ends flat below the voltage limit."""
+_TAIL_H = 20.0
+"""A charge is over when the voltage limit leaves C/20, at the latest."""
 
 
 @dataclass(frozen=True)
@@ -54,13 +56,14 @@ def cell_preset(
 
     `given` says by part (entropy) what came from elsewhere. A cell is full (1) where its
     open-circuit voltage reaches the voltage limit with the error of that voltage, so that no
-    voltage within the limit overfills it; the charge is complete where the recordings' cell was.
+    voltage within the limit overfills it; the charge is complete where the recordings' cell was, or
+    where the most resistive cell of the family still takes C/20 below the voltage limit.
     """
     interval = cell_intervals(cell, rated)
     full = _full(cell, rated, interval)
     notes: dict[str, str] = {}
     parameters = _parameters(cell, rated, interval, full, given, notes)
-    limits = _limits(rated, parameters, full, notes)
+    limits = _limits(rated, parameters, full, _voltage_sensor(interval), notes)
     preset = Preset(
         name=name,
         description=f"Identified from {len(cell.recordings)} recordings without a measured core",
@@ -209,9 +212,16 @@ def _temperatures_K(rated: RatedLimits) -> Array:
     return np.round(np.linspace(low_K, high_K, count), 2)
 
 
-def _limits(rated: RatedLimits, cell: CellParameters, full: _Full, notes: dict[str, str]) -> Limits:
+def _limits(
+    rated: RatedLimits,
+    cell: CellParameters,
+    full: _Full,
+    voltage: Sensor,
+    notes: dict[str, str],
+) -> Limits:
     sources = rated.sources
-    completion = math.floor(1000.0 * min(0.99, 0.995 * full.share)) / 1000.0
+    recorded, provable = 0.995 * full.share, _provable_soc(rated, cell, voltage)
+    completion = math.floor(1000.0 * min(0.99, recorded, provable)) / 1000.0
     notes |= {
         "limits.max_voltage_V": sources["max_voltage_V"],
         "limits.max_soc": "by definition: the open-circuit voltage is at the limit",
@@ -219,7 +229,9 @@ def _limits(rated: RatedLimits, cell: CellParameters, full: _Full, notes: dict[s
         "limits.max_surface_temperature_K": sources["charge_temperature_degC"],
         "limits.reference_current_A": sources["max_charge_A"],
         "limits.current_growth_A_per_s": "chosen: 1C a second, at most the whole current in 2 s",
-        "limits.completion_soc": "where the recordings' full cell was, less half a percent",
+        "limits.completion_soc": "where the recordings' full cell was, less half a percent"
+        if recorded <= provable
+        else "the open-circuit voltage that C/20 leaves to the most resistive cell of the family",
     }
     return Limits(
         rated.max_voltage_V,
@@ -230,6 +242,24 @@ def _limits(rated: RatedLimits, cell: CellParameters, full: _Full, notes: dict[s
         _figures(min(cell.capacity_Ah, 0.5 * rated.max_charge_A), 2),
         completion,
     )
+
+
+def _provable_soc(rated: RatedLimits, cell: CellParameters, voltage: Sensor) -> float:
+    """State of charge up to which a voltage within its limit proves that the cell is that full.
+
+    From a reading goes off what the greatest resistances make of C/20, and all errors; so much must
+    be left between the open-circuit voltage and the limit, or a charge comes to no end.
+    """
+    interval, table = cell.interval, cell.resistance
+    assert interval is not None and table is not None
+    ohm = np.array([row[-1] for row in table.ohm])
+    at_298_K = float(np.interp(298.15, table.temperature_K, ohm))
+    greatest_ohm = at_298_K * interval.resistance[1] + interval.polarisation[1] * sum(
+        branch.resistance_ohm for branch in cell.branches
+    )
+    left_V = interval.ocv_error_V + 2.0 * voltage.error_bound
+    left_V += greatest_ohm * cell.capacity_Ah / _TAIL_H
+    return float(np.interp(rated.max_voltage_V - left_V, cell.ocv.voltage_V, cell.ocv.soc))
 
 
 def _gains(cell: CellParameters, notes: dict[str, str]) -> Gains:
@@ -257,11 +287,15 @@ def _sensors(limits: Limits, interval: CellIntervals) -> Sensors:
             _figures(max(2e-4 * range_A, noise["current_A"]), 1),
             _figures(5e-4 * range_A, 1),
         ),
-        Sensor(0.0005, _figures(max(0.0005, noise["voltage_V"]), 1), 0.001),
+        _voltage_sensor(interval),
         Sensor(0.01, _figures(max(0.005, noise["surface_temperature_K"]), 1), 0.05),
         Sensor(0.01, 0.005, 0.05),
         Sensor(0.005, 0.002, 0.01),
     )
+
+
+def _voltage_sensor(interval: CellIntervals) -> Sensor:
+    return Sensor(0.0005, _figures(max(0.0005, interval.noise["voltage_V"]), 1), 0.001)
 
 
 def _heat_W(cell: CellParameters, limits: Limits) -> float:

@@ -102,6 +102,24 @@ def test_an_unused_recording_lies_within_the_intervals(
 
 
 @pytest.mark.slow
+def test_the_most_resistive_cell_of_the_family_can_be_proven_full_at_c_20(found: Preset) -> None:
+    """With all that the firmware takes off a reading (docs/family.md, Full)."""
+    cell, interval, limits = found.cell, found.cell.interval, found.limits
+    greatest_ohm = interval.resistance[1] * float(
+        ohmic_resistance_ohm(cell, 298.15, cell.resistance.soc[-1])
+    ) + interval.polarisation[1] * sum(branch.resistance_ohm for branch in cell.branches)
+    reading_V = limits.max_voltage_V - found.sensors.voltage_V.error_bound
+    least_ocv_V = (
+        reading_V
+        - found.sensors.voltage_V.error_bound
+        - interval.ocv_error_V
+        - greatest_ohm * cell.capacity_Ah / 20.0
+    )
+    assert least_ocv_V >= float(cell.ocv(limits.completion_soc))
+    assert limits.completion_soc > 0.9
+
+
+@pytest.mark.slow
 def test_another_cell_is_not_within_the_intervals(found: Preset, files: dict[str, Path]) -> None:
     other = read_cycler(files["unused"], FORM)
     rising = type(other)(**{**vars(other), "voltage_V": other.voltage_V + 0.3})

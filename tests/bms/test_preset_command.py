@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bms.errors import ModelMismatchError
@@ -164,6 +165,18 @@ def test_the_voltage_at_completion_is_told_from_both_sides(tmp_path) -> None:
     for limit_V, keys_told in ((3.440, {"limits.max_voltage_V"}), (3.4401, set())):
         edit = ("max_voltage_V = 3.6", f"max_voltage_V = {limit_V}")
         assert complained(tmp_path, edit).keys() == keys_told
+
+
+def test_what_a_family_can_prove_of_a_full_cell_is_told_from_both_sides(tmp_path) -> None:
+    """Of samsung_30q: 4.2 V less 15 mV of its curve and twice 4.05 mV of the sensor, 4.1769 V."""
+    preset = load_preset("samsung_30q")
+    proven_V = 4.2 - 0.015 - 2.0 * 0.00405
+    edge = float(np.interp(proven_V, preset.cell.ocv.voltage_V, preset.cell.ocv.soc))
+    text = preset_path("samsung_30q").read_text(encoding="utf-8")
+    for soc, keys_told in ((edge + 1e-4, {"limits.completion_soc"}), (edge - 1e-4, set())):
+        edit = ("completion_soc = 0.937", f"completion_soc = {soc:.6f}")
+        path = written(tmp_path, edit, text=text)
+        assert {complaint.key for complaint in complaints(path)} == keys_told
 
 
 def test_file_that_is_no_toml_or_not_there_is_refused_in_one_line(bms, tmp_path) -> None:

@@ -4,11 +4,13 @@ leave no charge."""
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields
 from itertools import chain
 
 import numpy as np
 
 from bms.presets.agreement import ValueOf
+from bms.presets.schema import Sensor
 
 Slip = tuple[str, str, str]
 """Key, what is odd, remedy."""
@@ -70,6 +72,22 @@ def _full(value_of: ValueOf) -> Iterator[Slip]:
             f"{limit_V:g} V is not above the open-circuit voltage {end_V:.4g} V at "
             f"limits.completion_soc {full:g}, so that the charge is never complete",
             "raise it, if the data sheet allows it, or lower limits.completion_soc",
+        )
+        return
+    error_V = value_of("cell.interval.ocv_error_V")
+    if error_V is None:
+        return
+    # A family's cell is full when its least open-circuit voltage is: reading, and no more, less all
+    # errors. The reading stays below the limit by its own error.
+    sensor = Sensor(*(value_of(f"sensors.voltage_V.{field.name}") for field in fields(Sensor)))
+    proven_V = limit_V - error_V - 2.0 * sensor.error_bound
+    if end_V >= proven_V:
+        yield (
+            "limits.completion_soc",
+            f"{full:g} is at an open-circuit voltage of {end_V:.4g} V, and no voltage within "
+            f"limits.max_voltage_V proves more than {proven_V:.4g} V with the errors of "
+            "cell.interval.ocv_error_V and sensors.voltage_V, so that the charge is never complete",
+            f"lower it below {float(np.interp(proven_V, voltage_V, soc)):.3f}",
         )
 
 
