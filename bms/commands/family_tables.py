@@ -43,6 +43,10 @@ def print_family(result: FamilyVerification) -> None:
             lie.why,
         )
     lies.print(console)
+    console.print(
+        f"for a coolant of at most {result.coolant_up_to_K:.2f} K: beside a warmer one "
+        "disturbances at their bounds can take a cell over a limit at 0 A, and a charge adds"
+    )
     verdict = "certified" if result.certified else "NOT certified"
     console.print(
         f"{result.preset}: {verdict} for every cell of its family, {result.held_s:g} s from each "

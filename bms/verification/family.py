@@ -11,6 +11,7 @@ from bms.firmware.calibration import calibration_block
 from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.verification.family_constants import Relation, relations
+from bms.verification.family_coolant import warmest_coolant_K
 from bms.verification.family_lies import Lie, worst_lies
 from bms.verification.family_search import SAMPLES, Violation, search_family
 
@@ -23,6 +24,7 @@ class FamilyVerification:
 
     `relations` are what the derivation needs of the firmware's constants, `violations` what was
     found against its claims by simulated holds, `lies` what one wrong sensor can do unseen.
+    `coolant_up_to_K` is where no disturbance reaches a limit at 0 A; a warmer one is not covered.
     """
 
     preset: str
@@ -32,6 +34,7 @@ class FamilyVerification:
     samples: int
     violations: tuple[Violation, ...]
     lies: tuple[Lie, ...]
+    coolant_up_to_K: float
     wall_time_s: float
 
     @property
@@ -51,6 +54,7 @@ class FamilyVerification:
             "samples": self.samples,
             "violations": [asdict(violation) for violation in self.violations],
             "single_sensor_lies": [asdict(lie) for lie in self.lies],
+            "coolant_up_to_K": self.coolant_up_to_K,
             "wall_time_s": self.wall_time_s,
         }
 
@@ -80,5 +84,6 @@ def verify_family(
         samples=samples,
         violations=violations,
         lies=lies,
+        coolant_up_to_K=warmest_coolant_K(preset),
         wall_time_s=time.monotonic() - begin,
     )
