@@ -76,8 +76,8 @@ def pack_database() -> dict[str, str]:
         taken.append(chosen)
         lists[name] = chosen.hex()
     faults = load_database().get_message_by_name("Diagnostics").get_signal_by_name("FirstFault")
-    constraint = load_database().get_message_by_name("Decision").get_signal_by_name(
-        "ActiveConstraint"
+    constraint = (
+        load_database().get_message_by_name("Decision").get_signal_by_name("ActiveConstraint")
     )
     text = (
         environment()

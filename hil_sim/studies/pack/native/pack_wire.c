@@ -175,3 +175,8 @@ uint32_t pack_wire_exchange(pack_ecu_t *ecu, const can_frame_t *frames, uint32_t
     }
     return sends;
 }
+
+uint32_t pack_command_id(void)
+{
+    return PACK_TRANSMITTED[PACK_TRANSMITTED_COMMAND].id;
+}

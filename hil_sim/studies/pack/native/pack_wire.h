@@ -56,6 +56,9 @@ uint32_t pack_wire_publish(pack_wire_t *wire, const pack_measured_t *measured, f
 void pack_wire_hear(pack_wire_t *wire, const can_frame_t *frames, uint32_t count,
                     pack_heard_t *heard);
 
+/* Identifier of what an ECU's step ends with. */
+uint32_t pack_command_id(void);
+
 /* A period of an ECU by one call; returns how many frames it sends. */
 uint32_t pack_wire_exchange(pack_ecu_t *ecu, const can_frame_t *frames, uint32_t count,
                             can_frame_t *sent);
