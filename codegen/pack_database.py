@@ -1,4 +1,4 @@
-"""codegen/can/pack.dbc, written from a short description: three cells a page, 16 pages a message."""
+"""codegen/can/pack.dbc from a short description: three cells a page, 16 pages a message."""
 
 from __future__ import annotations
 

@@ -11,11 +11,12 @@ from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.presets.schema import Sensor
 from hil_sim.studies.pack._pack import lib
-from hil_sim.studies.pack.reserves import reserves
 from hil_sim.studies.pack.engine import Core, View, all_cells
+from hil_sim.studies.pack.reserves import reserves
 from hil_sim.studies.pack.spread import Spread, Surroundings
 
-NO_SPREAD = Spread(*[(1.0, 1.0)] * 5, start_soc=0.0)
+_EQUAL = (1.0, 1.0)
+NO_SPREAD = Spread(_EQUAL, _EQUAL, _EQUAL, _EQUAL, _EQUAL, start_soc=0.0)
 
 
 class SpreadKind(str, Enum):

@@ -1,4 +1,4 @@
-"""A pack over its bus: frames that any tool reads, and the current that the core gives by itself."""
+"""A pack over its bus: frames that any tool reads, and the currents of the core by itself."""
 
 from __future__ import annotations
 
