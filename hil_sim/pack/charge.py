@@ -17,7 +17,7 @@ from hil_sim.nodes.ecu import EcuNode
 from hil_sim.nodes.plant import Delivery
 from hil_sim.pack.ecu import PackEcu
 from hil_sim.pack.node import PackPlantNode
-from hil_sim.pack.plant import PackPlant, PackWire, Tamper
+from hil_sim.pack.plant import PackPlant, PackWire, Tamper, obeyed_A
 from hil_sim.pack.settings import PackChargeSettings
 from hil_sim.run.result import STOP_COMPLETE, STOP_FAULT, STOP_SILENT, STOP_TIME_LIMIT
 from hil_sim.studies.pack._pack import lib
@@ -139,7 +139,7 @@ class _Run:
             result.reason = self._stop_reason(heard)
             if not result.reason:
                 self._prepare(heard)
-                plant.hold(_obeyed_A(heard))
+                plant.hold(obeyed_A(heard))
         result.wall_time_s = time.perf_counter() - start_s
         result.peaks, result.final_socs = plant.peaks(), plant.socs()
         return result
@@ -215,10 +215,3 @@ class _Run:
                 return STOP_FAULT
         run_s = (result.steps - result.edge) * self._settings.preset.timing.sampling_period_s
         return STOP_TIME_LIMIT if run_s >= self._settings.max_time_s else ""
-
-
-def _obeyed_A(heard: Any) -> float | None:
-    """What the charger obeys: none of several commands, and no number that it cannot read."""
-    if heard.is_contested:
-        return 0.0
-    return None if math.isnan(heard.command_A) else float(heard.command_A)

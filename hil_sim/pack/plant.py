@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -15,8 +16,8 @@ from hil_sim.studies.pack._pack import ffi, lib
 from hil_sim.studies.pack.engine import BLOCK_PERIODS, SUB_STEPS, PackCharge
 from hil_sim.studies.pack.spread import draw_pack
 
-Tamper = Callable[[Any], None]
-"""Changes what the sensors read, a pack_measured_t, in place."""
+Tamper = Callable[["PackPlant"], None]
+"""Changes what the sensors of a plant have read, in place."""
 _UNSAID = 255
 
 
@@ -136,3 +137,10 @@ class PackWire:
             self.heard,
         )
         return self.heard
+
+
+def obeyed_A(heard: Any) -> float | None:
+    """What the charger obeys: none of several commands, and no number that it cannot read."""
+    if heard.is_contested:
+        return 0.0
+    return None if math.isnan(heard.command_A) else float(heard.command_A)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import lru_cache
 
 from bms.bus_signals import BUS
 from bms.errors import InputError
@@ -63,7 +64,7 @@ class PackChargeSettings:
 
         Raises InputError as `reserves` and ModelMismatchError as calibration_fields does.
         """
-        kept = reserves(self.preset, self.spread.spread, self.around)
+        kept = _reserves(self.preset, self.spread.spread, self.around)
         return Core(self.preset, self.model, kept)
 
     @property
@@ -79,6 +80,9 @@ class PackChargeSettings:
         cell_V = self.preset.sensors.voltage_V.error_bound + BUS.voltage_V
         return self.cells * cell_V + self.pack_voltage_sensor.error_bound + PACK_VOLTAGE_STEP_V
 
+
+_reserves = lru_cache(maxsize=8)(reserves)
+"""A second to compute, for plant, ECU and every further run."""
 
 PACK_VOLTAGE_STEP_V = 0.01
 """Half a step of PackVoltage; a test holds it to the database."""
