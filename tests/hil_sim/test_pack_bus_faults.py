@@ -136,11 +136,16 @@ MUTANTS = {
     ),
     "checksum": (
         [(E2E, "data[0] != e2e_crc(data, length, data_ids)", "false")],
+        ["voltage page corrupted", "temperature page corrupted"],
+    ),
+    # Such a page is missed under its own number as well.
+    "number of a page": (
         [
-            "voltage page corrupted",
-            "temperature page corrupted",
-            "voltage page under another's number",
+            (E2E, "data[0] != e2e_crc(data, length, data_ids)", "false"),
+            (NETWORK, "((receiver->good_periods & 1u) == 0u)", "false"),
+            (NETWORK, "            forget_page(ecu, group, page);\n            if", "            if"),
         ],
+        ["voltage page under another's number"],
     ),
     "counter": (
         [(E2E, "(steps == 0u) ||", "")],
