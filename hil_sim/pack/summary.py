@@ -46,15 +46,15 @@ def summary(result: PackResult) -> dict[str, Any]:
         "stop_reason": result.reason,
         "steps": result.steps,
         "frames_per_period": result.frames / result.steps,
-        "charge_time_s": result.charge_periods * period_s,
+        "charge_time_s": round(result.charge_periods * period_s, 6),
         "max_core_temperature_K": float(result.peaks[:, 1].max()),
         "max_surface_temperature_K": float(result.peaks[:, 2].max()),
         "max_voltage_V": float(result.peaks[:, 3].max()),
         "fullest_soc": max(result.final_socs),
         "emptiest_soc": min(result.final_socs),
         "weakest_cell": max(result.governed, key=lambda c: (result.governed[c], -c), default=None),
-        "governed_s": {str(c): n * period_s for c, n in sorted(result.governed.items())},
-        "constraint_s": {name: n * period_s for name, n in sorted(result.constraints.items())},
+        "governed_s": {str(c): round(n * period_s, 6) for c, n in sorted(result.governed.items())},
+        "constraint_s": {name: round(n * period_s, 6) for name, n in sorted(result.constraints.items())},
         "worst_margins": [
             {"cell": i + 1, **dict(zip(KINDS, map(float, row)))} for i, row in enumerate(left)
         ],
