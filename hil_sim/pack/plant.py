@@ -113,9 +113,13 @@ class PackWire:
         self.heard.state = self.heard.first_fault = _UNSAID
         self.sync = Frame(lib.PACK_SYNC_ID, b"")
 
-    def publish(self, charge: bool) -> list[Frame]:
-        """The frames of a period up to SYNC, of what was measured last."""
-        self._asked.request = lib.REQUEST_CHARGE if charge else lib.REQUEST_OFF
+    def publish(self, charge: bool, request: int | None = None) -> list[Frame]:
+        """The frames of a period up to SYNC, of what was measured last.
+
+        `request` is a code to send in place of that for charge or off.
+        """
+        code = lib.REQUEST_CHARGE if charge else lib.REQUEST_OFF
+        self._asked.request = code if request is None else request
         plant = self._plant
         count = lib.pack_wire_publish(
             self._wire,

@@ -53,6 +53,11 @@ class PackChargeSettings:
         most = lib.BMS_MAX_FAMILY_CELLS if is_family else lib.BMS_MAX_CELLS
         if not 1 <= self.cells <= most:
             raise InputError(f"--cells {self.cells}: from 1 to {most} cells fit into a pack")
+        if is_family and self.per_thermistor != 1:
+            raise InputError(
+                f"--per-thermistor {self.per_thermistor}: preset '{self.preset.name}' states a "
+                "family, each cell of which needs a thermistor; leave it out"
+            )
 
     @property
     def view(self) -> View:

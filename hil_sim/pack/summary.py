@@ -54,7 +54,9 @@ def summary(result: PackResult) -> dict[str, Any]:
         "emptiest_soc": min(result.final_socs),
         "weakest_cell": max(result.governed, key=lambda c: (result.governed[c], -c), default=None),
         "governed_s": {str(c): round(n * period_s, 6) for c, n in sorted(result.governed.items())},
-        "constraint_s": {name: round(n * period_s, 6) for name, n in sorted(result.constraints.items())},
+        "constraint_s": {
+            name: round(n * period_s, 6) for name, n in sorted(result.constraints.items())
+        },
         "worst_margins": [
             {"cell": i + 1, **dict(zip(KINDS, map(float, row)))} for i, row in enumerate(left)
         ],

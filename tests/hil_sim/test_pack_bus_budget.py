@@ -64,7 +64,7 @@ def test_no_period_on_the_wire_is_longer_than_its_budget(wire):
 
 @pytest.mark.parametrize(("data_bytes", "most"), [(0, 55), (8, 135)])
 def test_the_longest_frame_is_that_of_the_standard(data_bytes, most):
-    """47 bits and 8 a byte, with a stuff bit for each four after the first one of 34 and 8 a byte."""
+    """47 bits and 8 a byte, and a stuff bit for each four of 34 and 8 a byte after the first."""
     assert most_bits(data_bytes) == most
 
 

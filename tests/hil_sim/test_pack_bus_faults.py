@@ -111,7 +111,7 @@ def exchanged(first, second):
 
 
 def test_exchanged_thermistors_are_not_seen_and_change_the_name_of_the_cell_but_not_the_current():
-    """All cells have the same constants, so that the same readings give the same bounds together."""
+    """All cells have the same constants: the same readings give the same bounds together."""
     plain = charge_pack(settings_of(16))
     weakest = max(plain.governed, key=plain.governed.get)
     coolest = int(np.argmin(plain.peaks[:, 2])) + 1
@@ -126,26 +126,36 @@ def test_exchanged_thermistors_are_not_seen_and_change_the_name_of_the_cell_but_
 
 NETWORK, ECU = "firmware_c/pack_ecu/pack_network.c", "firmware_c/pack_ecu/pack_ecu.c"
 SYMPTOMS, E2E = "firmware_c/pack/pack_symptoms.c", "firmware_c/src/e2e.c"
+AGE = [
+    (NETWORK, "((receiver->good_periods & 1u) == 0u)", "false"),
+    (
+        NETWORK,
+        "            forget_page(ecu, group, page);\n            if (ecu->missing",
+        "            if (ecu->missing",
+    ),
+]
+CRC = (E2E, "data[0] != e2e_crc(data, length, data_ids)", "false")
+SUM = (NETWORK, "is_electrical && sum_deviates(ecu)", "false")
+
+
+def unlimited(reading, limits, fault):
+    """The range of a reading that nobody looks at."""
+    return (SYMPTOMS, f"outside_if({reading}, &limits->{limits}, FAULT_{fault}_RANGE)", "0u")
+
+
 MUTANTS = {
     # A page that does not come is a symptom, and leaves its cells without readings.
     "age of pages": (
-        [
-            (NETWORK, "((receiver->good_periods & 1u) == 0u)", "false"),
-            (NETWORK, "            forget_page(ecu, group, page);\n            if", "            if"),
-        ],
+        AGE,
         ["voltage page missing", "temperature page missing", "voltage page too short"],
     ),
     "checksum": (
-        [(E2E, "data[0] != e2e_crc(data, length, data_ids)", "false")],
+        [CRC],
         ["voltage page corrupted", "temperature page corrupted"],
     ),
     # Such a page is missed under its own number as well.
     "number of a page": (
-        [
-            (E2E, "data[0] != e2e_crc(data, length, data_ids)", "false"),
-            (NETWORK, "((receiver->good_periods & 1u) == 0u)", "false"),
-            (NETWORK, "            forget_page(ecu, group, page);\n            if", "            if"),
-        ],
+        [CRC, *AGE],
         ["voltage page under another's number"],
     ),
     "counter": (
@@ -153,7 +163,7 @@ MUTANTS = {
         ["voltage page frozen", "temperature page frozen", "voltage page from two senders"],
     ),
     "number of cells": (
-        [(NETWORK, "        ecu->is_disturbed = true;\n        return true;", "        return true;")],
+        [(NETWORK, "ecu->is_disturbed = true;\n        return true;", "return true;")],
         ["page of cells that are not there"],
     ),
     "age of states of charge": (
@@ -161,7 +171,7 @@ MUTANTS = {
         ["plug-in page missing"],
     ),
     "sum of voltages": (
-        [(NETWORK, "is_electrical && sum_deviates(ecu)", "false")],
+        [SUM],
         [
             "a cell's voltage off by 0.3 V",
             "the string's voltage off by 1 V",
@@ -178,10 +188,7 @@ MUTANTS = {
     ),
     # Each value that is no number or out of range is caught twice: by the core and by the sum.
     "range of voltages": (
-        [
-            (SYMPTOMS, "outside_if(reading.voltage_V, &limits->voltage_V, FAULT_VOLTAGE_RANGE)", "0u"),
-            (NETWORK, "is_electrical && sum_deviates(ecu)", "false"),
-        ],
+        [unlimited("reading.voltage_V", "voltage_V", "VOLTAGE"), SUM],
         ["a cell's voltage not a number"],
     ),
     "range of surfaces": (
@@ -197,11 +204,11 @@ MUTANTS = {
     ),
     "surface deficit": ([(SYMPTOMS, "limits->surface_deficit_K", "1e9f")], ["thermistor stuck"]),
     "range of the coolant": (
-        [(SYMPTOMS, "outside_if(outlet_K, &limits->coolant_temperature_K, FAULT_COOLANT_RANGE)", "0u")],
+        [unlimited("outlet_K", "coolant_temperature_K", "COOLANT")],
         ["no coolant reading"],
     ),
     "range of the current": (
-        [(SYMPTOMS, "outside_if(reading.current_A, &limits->current_A, FAULT_CURRENT_RANGE)", "0u")],
+        [unlimited("reading.current_A", "current_A", "CURRENT")],
         ["no current reading"],
     ),
 }  # fmt: skip

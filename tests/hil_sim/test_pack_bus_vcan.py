@@ -37,7 +37,8 @@ bus=(--cells {CELLS} --bus socketcan:vcan0)
 "${{bms[@]}}" plant "${{bus[@]}}" --answer-timeout-s 0.1 2> alone.err; echo $? > alone.status
 
 ( "${{bms[@]}}" ecu "${{bus[@]}}" --silence-s 3 > ecu.out; echo $? > ecu.status ) &
-"${{bms[@]}}" plant "${{bus[@]}}" --seed {SEED} --max-time-s {MAX_TIME_S} --out run --json > plant.json
+charge=(--seed {SEED} --max-time-s {MAX_TIME_S} --out run --json)
+"${{bms[@]}}" plant "${{bus[@]}}" "${{charge[@]}}" > plant.json
 echo $? > plant.status
 wait
 
