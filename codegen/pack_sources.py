@@ -13,7 +13,6 @@ from codegen.can_database import (
     PACK,
     PLANT,
     TIMEOUT_ATTRIBUTE,
-    data_ids,
     database_digest,
     load_database,
     network_version,
@@ -95,6 +94,8 @@ def _group(database: Database, group: Group) -> dict[str, Any]:
     ]
     values = [_values(message) for message in messages]
     assert all(own == values[0] for own in values), "pages of a group differ"
+    ids = [message.frame_id for message in messages]
+    assert ids == list(range(ids[0], ids[0] + MESSAGES_A_GROUP)), "the C code counts on it"
     first = values[0][0]
     period_ms = number_attribute(database, database.get_message_by_name("SYNC"), CYCLE_ATTRIBUTE)
     return {
@@ -103,7 +104,6 @@ def _group(database: Database, group: Group) -> dict[str, Any]:
         "scaling": first["scaling"],
         "pages_a_period": number_attribute(database, messages[0], PAGES_ATTRIBUTE),
         "timeout_periods": number_attribute(database, messages[0], TIMEOUT_ATTRIBUTE) // period_ms,
-        "length": len(data_ids(messages[0])),
     }
 
 

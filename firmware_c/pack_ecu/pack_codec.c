@@ -49,16 +49,23 @@ uint64_t pack_with_value(uint32_t signal, float value, codec_rounding_t rounding
     return (uint64_t)codec_encode(&place->scaling, value, rounding) << place->start;
 }
 
+/* The generator has it so: identifiers of a group follow each other, and values are whole bytes. */
+#define PAGE_BYTE (PACK_PAGE_START / 8)
+#define PAGE_SHIFT (PACK_PAGE_START % 8)
+#define FIRST_VALUE_BYTE (PACK_VALUE_START / 8)
+typedef char values_are_two_bytes[((PACK_VALUE_LENGTH == 16) && (PACK_VALUE_START % 8 == 0) &&
+                                   (PACK_VALUE_START == 8 * (PAGE_BYTE + 1)))
+                                      ? 1
+                                      : -1];
+
 bool pack_page_of(uint32_t group, const can_frame_t *frame, uint32_t *page)
 {
-    for (uint32_t i = 0u; i < PACK_GROUP_MESSAGES; i++) {
-        if (frame->id == PACK_GROUPS[group].message[i].id) {
-            *page = i * PACK_PAGES_A_MESSAGE +
-                    field(pack_bits(frame), PACK_PAGE_START, PACK_VALUE_START - PACK_PAGE_START);
-            return true;
-        }
+    const uint32_t message = frame->id - PACK_GROUPS[group].message[0].id;
+    if (message >= PACK_GROUP_MESSAGES) {
+        return false;
     }
-    return false;
+    *page = message * PACK_PAGES_A_MESSAGE + (frame->data[PAGE_BYTE] >> PAGE_SHIFT);
+    return true;
 }
 
 const codec_message_t *pack_page_message(uint32_t group, uint32_t page)
@@ -71,23 +78,26 @@ uint32_t pack_pages(uint32_t cells)
     return (cells + PACK_CELLS_A_PAGE - 1u) / PACK_CELLS_A_PAGE;
 }
 
-float pack_page_value(uint32_t group, uint64_t bits, uint32_t place)
+float pack_page_value(uint32_t group, const can_frame_t *frame, uint32_t place)
 {
-    return codec_decode(&PACK_GROUPS[group].scaling,
-                        field(bits, PACK_VALUE_START + PACK_VALUE_LENGTH * place,
-                              PACK_VALUE_LENGTH));
+    const uint8_t *bytes = &frame->data[FIRST_VALUE_BYTE + 2u * place];
+    return codec_decode(&PACK_GROUPS[group].scaling, bytes[0] | ((uint32_t)bytes[1] << 8u));
 }
 
 void pack_fill_page(can_frame_t *frame, uint32_t group, uint32_t page, const float *values,
                     uint32_t count)
 {
-    uint64_t bits = (uint64_t)(page % PACK_PAGES_A_MESSAGE) << PACK_PAGE_START;
+    const codec_message_t *message = pack_page_message(group, page);
+    frame->id = message->id;
+    frame->length = message->length;
+    frame->data[0] = 0u;
+    frame->data[PAGE_BYTE] = (uint8_t)((page % PACK_PAGES_A_MESSAGE) << PAGE_SHIFT);
     for (uint32_t place = 0u; place < PACK_CELLS_A_PAGE; place++) {
         const uint32_t raw = codec_encode(&PACK_GROUPS[group].scaling,
                                           (place < count) ? values[place] : NAN, CODEC_NEAREST);
-        bits |= (uint64_t)raw << (PACK_VALUE_START + PACK_VALUE_LENGTH * place);
+        frame->data[FIRST_VALUE_BYTE + 2u * place] = (uint8_t)raw;
+        frame->data[FIRST_VALUE_BYTE + 2u * place + 1u] = (uint8_t)(raw >> 8u);
     }
-    pack_fill(frame, pack_page_message(group, page), bits);
 }
 
 uint32_t pack_cells_from(uint32_t cells, uint32_t page)

@@ -37,7 +37,7 @@ const codec_message_t *pack_page_message(uint32_t group, uint32_t page);
 uint32_t pack_pages(uint32_t cells);
 
 /* Value of a cell of a page, 0 to PACK_CELLS_A_PAGE - 1. */
-float pack_page_value(uint32_t group, uint64_t bits, uint32_t place);
+float pack_page_value(uint32_t group, const can_frame_t *frame, uint32_t place);
 
 /* Fills a frame with a page of so many values; what it has room for beyond them is not available. */
 void pack_fill_page(can_frame_t *frame, uint32_t group, uint32_t page, const float *values,

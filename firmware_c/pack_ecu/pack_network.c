@@ -34,15 +34,15 @@ static float *values_of(pack_ecu_t *ecu, uint32_t group)
 }
 
 /* A value beyond the last one is of a sender that takes the pack for another. */
-static void read_page(pack_ecu_t *ecu, uint32_t group, uint32_t page, uint64_t bits)
+static void read_page(pack_ecu_t *ecu, uint32_t group, uint32_t page, const can_frame_t *frame)
 {
-    float *values = values_of(ecu, group);
-    for (uint32_t place = 0u; place < PACK_CELLS_A_PAGE; place++) {
-        const uint32_t index = page * PACK_CELLS_A_PAGE + place;
-        const float value = pack_page_value(group, bits, place);
-        if (index < count_of(ecu, group)) {
-            values[index] = value;
-        } else if (!isnan(value)) {
+    float *values = &values_of(ecu, group)[page * PACK_CELLS_A_PAGE];
+    const uint32_t count = pack_cells_from(count_of(ecu, group), page);
+    for (uint32_t place = 0u; place < count; place++) {
+        values[place] = pack_page_value(group, frame, place);
+    }
+    for (uint32_t place = count; place < PACK_CELLS_A_PAGE; place++) {
+        if (!isnan(pack_page_value(group, frame, place))) {
             ecu->is_disturbed = true;
         }
     }
@@ -57,14 +57,14 @@ static bool receive_page(pack_ecu_t *ecu, uint32_t group, const can_frame_t *fra
     if (!pack_page_of(group, frame, &page)) {
         return false;
     }
-    if (page >= pack_pages(count_of(ecu, group))) {
+    if (page * PACK_CELLS_A_PAGE >= count_of(ecu, group)) {
         ecu->is_disturbed = true;
         return true;
     }
     const codec_message_t *message = pack_page_message(group, page);
     if (e2e_check(&ecu->page[group][page], frame->data, frame->length, message->length,
                   message->data_ids, message->policy.max_delta_counter) == E2E_OK) {
-        read_page(ecu, group, page, pack_bits(frame));
+        read_page(ecu, group, page, frame);
     }
     return true;
 }
@@ -126,10 +126,10 @@ void pack_network_receive(pack_ecu_t *ecu, const can_frame_t *frame)
 
 static void forget_page(pack_ecu_t *ecu, uint32_t group, uint32_t page)
 {
-    float *values = values_of(ecu, group);
-    const uint32_t first = page * PACK_CELLS_A_PAGE;
-    for (uint32_t i = first; (i < first + PACK_CELLS_A_PAGE) && (i < count_of(ecu, group)); i++) {
-        values[i] = NAN;
+    float *values = &values_of(ecu, group)[page * PACK_CELLS_A_PAGE];
+    const uint32_t count = pack_cells_from(count_of(ecu, group), page);
+    for (uint32_t place = 0u; place < count; place++) {
+        values[place] = NAN;
     }
 }
 
@@ -149,7 +149,8 @@ static uint8_t cell_of(const pack_ecu_t *ecu, uint32_t group, uint32_t index)
 
 static void judge_pages(pack_ecu_t *ecu, uint32_t group)
 {
-    for (uint32_t page = 0u; page < pack_pages(count_of(ecu, group)); page++) {
+    const uint32_t pages = pack_pages(count_of(ecu, group));
+    for (uint32_t page = 0u; page < pages; page++) {
         const e2e_verdict_t verdict =
             e2e_supervise(&ecu->page[group][page], &pack_page_message(group, page)->policy);
         ecu->is_disturbed = ecu->is_disturbed || verdict.is_disturbed;
@@ -164,7 +165,8 @@ static void judge_pages(pack_ecu_t *ecu, uint32_t group)
 
 static void age_plug_in_pages(pack_ecu_t *ecu)
 {
-    for (uint32_t page = 0u; page < pack_pages(ecu->pack.cells); page++) {
+    const uint32_t pages = pack_pages(ecu->pack.cells);
+    for (uint32_t page = 0u; page < pages; page++) {
         e2e_receiver_t *receiver = &ecu->page[PACK_GROUP_PLUG_IN_CHARGES][page];
         ecu->is_disturbed = ecu->is_disturbed || receiver->is_disturbed;
         receiver->is_disturbed = false;
@@ -220,7 +222,8 @@ bool pack_network_is_valid(const pack_ecu_t *ecu)
 /* Whether any page of a group has not come usable; of this period, as its newest good period is. */
 static bool is_page_missing(const pack_ecu_t *ecu, uint32_t group)
 {
-    for (uint32_t page = 0u; page < pack_pages(count_of(ecu, group)); page++) {
+    const uint32_t pages = pack_pages(count_of(ecu, group));
+    for (uint32_t page = 0u; page < pages; page++) {
         const e2e_receiver_t *receiver = &ecu->page[group][page];
         if ((receiver->state != E2E_VALID) || ((receiver->good_periods & 1u) == 0u)) {
             return true;

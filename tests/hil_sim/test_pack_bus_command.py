@@ -6,15 +6,18 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bms.errors import InputError
 from bms.model.pair import load_pair
 from hil_sim.bus.frame import Frame
 from hil_sim.logs import read_log
 from hil_sim.pack.charge import charge_pack
+from hil_sim.pack.cost import ecu_instructions
 from hil_sim.pack.ecu import PackEcu
 from hil_sim.pack.plant import PackPlant, PackWire, obeyed_A
 from hil_sim.pack.settings import PackChargeSettings
@@ -25,6 +28,9 @@ FIRMWARE = Path(__file__).parents[2] / "firmware_c"
 PRESET, MODEL = load_pair("paper_calibrated", None)
 LEAST_TIMES_REAL_TIME = 20.0
 MOST_RAM_BYTES = 16 * 1024
+MOST_INSTRUCTIONS = 220_000
+"""Of 96 cells with all frames; the core alone is held to 200,000 by test_pack_cost.py."""
+HAS_TOOLS = shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")
 
 
 @pytest.fixture(scope="module")
@@ -112,6 +118,28 @@ def test_the_ecu_of_96_cells_fits_into_16_kib(tmp_path):
     )  # fmt: skip
     match = re.search(r"^size:\n\s+\.word\s+(\d+)$", done.stdout, re.MULTILINE)
     assert match and 8 * 1024 < int(match[1]) <= MOST_RAM_BYTES
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not HAS_TOOLS, reason="needs gcc-arm-none-eabi and qemu-system-arm")
+def test_instructions_of_the_ecu_with_all_frames_are_linear_in_the_cells(tmp_path):
+    program = tmp_path / "pack_ecu_cost.elf"
+    make = ["make", "-s", "-f", "firmware_c/pack_cost/pack_cost.mk", f"BUILD={tmp_path}"]
+    subprocess.run(
+        [*make, f"PYTHON={sys.executable}", str(program)], cwd=FIRMWARE.parent, check=True
+    )
+    counted = {one.cells: one for one in ecu_instructions(program)}
+    assert {cells: one.frames for cells, one in counted.items()} == {1: 6, 16: 21, 96: 74, 192: 138}
+    assert all(one.periods > 50 for one in counted.values())
+    assert counted[96].most <= MOST_INSTRUCTIONS
+    steps = ((1, 16), (16, 96), (96, 192))
+    per_cell = [(counted[b].most - counted[a].most) / (b - a) for a, b in steps]
+    assert max(per_cell) <= 1.1 * min(per_cell)
+
+
+def test_a_program_that_is_not_built_is_refused_with_the_command_that_builds_it(tmp_path):
+    with pytest.raises(InputError, match=r"not built; run 'make -f firmware_c/pack_cost"):
+        ecu_instructions(tmp_path / "none.elf")
 
 
 def test_the_ecu_allocates_nothing_and_keeps_nothing_outside_of_its_state():

@@ -119,7 +119,7 @@ static void hear_page(pack_heard_t *heard, uint32_t group, const can_frame_t *fr
     for (uint32_t place = 0u; place < PACK_CELLS_A_PAGE; place++) {
         const uint32_t cell = page * PACK_CELLS_A_PAGE + place;
         if (cell < BMS_MAX_CELLS) {
-            values[cell] = pack_page_value(group, pack_bits(frame), place);
+            values[cell] = pack_page_value(group, frame, place);
         }
     }
 }
