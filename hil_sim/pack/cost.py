@@ -16,6 +16,7 @@ from hil_sim.studies.pack.cost import BOARD
 from hil_sim.targets import Emulation
 
 PROGRAM = Path("build/firmware/mps2_an386/pack_ecu_cost.elf")
+BUILD_COMMAND = f"make -f firmware_c/pack_cost/pack_cost.mk {PROGRAM}"
 _COUNT = struct.Struct("<6I")
 _TIMEOUT_S = 300.0
 
@@ -34,9 +35,7 @@ class EcuInstructions:
 def ecu_instructions(program: Path = PROGRAM) -> list[EcuInstructions]:
     """Counted in QEMU; InputError where the program is not built or does not end well."""
     if not program.is_file():
-        raise InputError(
-            f"{program}: not built; run 'make -f firmware_c/pack_cost/pack_cost.mk {PROGRAM}'"
-        )
+        raise InputError(f"{program}: not built; run '{BUILD_COMMAND}'")
     with tempfile.TemporaryDirectory() as name:
         results = Path(name) / "counts"
         semihosting = f"enable=on,target=native,arg=cost,arg={results}"

@@ -50,7 +50,7 @@ class PackPlantNode:
         else:
             raise BusError(
                 f"bus '{self._bus.name}': no ECU of a pack answers; "
-                f"start 'bms ecu --cells N --bus {self._bus.name}'"
+                f"start 'bms ecu --bus {self._bus.name}' with the same --cells"
             )
         if self._recorder is not None:
             time_s = period * self._period_s

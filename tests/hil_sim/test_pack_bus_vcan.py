@@ -91,7 +91,7 @@ def test_both_processes_end_well_and_the_ecu_saw_every_frame(guest):
 def test_a_plant_without_an_ecu_says_how_to_start_one(guest):
     assert status(guest / "alone.status") == 2
     (line,) = (guest / "alone.err").read_text().splitlines()
-    assert "bms ecu --cells" in line
+    assert "'bms ecu --bus socketcan:vcan0' with the same --cells" in line
 
 
 def test_an_ecu_of_another_number_of_cells_gets_no_charge(guest):
