@@ -235,3 +235,55 @@ def test_without_its_check_a_fault_is_met_no_more(tmp_path, check):
 def test_every_fault_has_a_mutant_that_shows_it_red():
     shown = {row for _, rows in MUTANTS.values() for row in rows}
     assert {fault.name for fault in FAULTS} - shown == {"a cell's voltage out of range"}
+
+
+@pytest.mark.parametrize("times", [4, 5])
+def test_a_temperature_page_may_be_lost_four_times_in_a_minute(times):
+    lost_at = set(range(0, 10 * times, 10))
+
+    def lose(frame, since):
+        is_lost = frame.frame_id == 0x220 and frame.data[1] >> 4 == 0 and since in lost_at
+        return [] if is_lost else [frame]
+
+    fault = PackFault("lost pages", 0, (FirstFault.OUT_OF_DOMAIN,), delivery=lose)
+    result = run_fault(settings_of(), fault, 60)
+    assert all(result.commands_A[BEGIN_PERIOD + since] == 0.0 for since in lost_at)
+    latched = bool(result.latched_faults >> FirstFault.OUT_OF_DOMAIN & 1)
+    assert latched == (times == 5)
+    assert (result.commands_A[-1] == 0.0) == latched
+
+
+def test_readings_of_chance_under_right_checksums_bring_no_other_current_than_0_A():
+    """Some cell's reading is no number, or far from what the pack can be, in every period."""
+    settings = settings_of(9)
+    rng = np.random.default_rng(1)
+    for _ in range(40):
+        ecu, plant = PackEcu(settings), PackPlant(settings)
+        wire = PackWire(settings, plant)
+        for period in range(90):
+            plant.measure()
+            if period >= 70:
+                spoil(plant, rng)
+            heard = wire.hear(ecu.exchange(wire.publish(charge=period > 20)))
+            plant.hold(obeyed_A(heard))
+            if period == 69:
+                assert heard.command_A < -10.0
+            if period >= 70:
+                assert heard.command_A == 0.0
+
+
+def spoil(plant, rng):
+    """One reading of one cell, or one that all share, becomes another."""
+    measured, cell = plant.measured, int(rng.integers(9))
+    value = rng.choice([np.nan, np.inf, -np.inf, 1e30, -1e30, 0.0])
+    match int(rng.integers(5)):
+        case 0:
+            measured.voltage_V[cell] = value
+        case 1:
+            measured.surface_temperature_K[cell] = value
+        case 2:
+            measured.coolant_in_K = value
+        case 3:
+            plant.pack_voltage_V = value
+        case _:
+            measured.current_A = rng.choice([np.nan, np.inf, -np.inf, 1e30, -1e30])
