@@ -1,6 +1,7 @@
 """`python -m codegen`: write what is generated and checked in anew.
 
-That is firmware_c/generated, hil_sim/bus/catalog.py and docs/can.md.
+That is firmware_c/generated, hil_sim/bus/catalog.py and docs/can.md, and of packs
+codegen/can/pack.dbc, firmware_c/pack/generated and docs/can-pack.md.
 """
 
 import sys
@@ -12,6 +13,9 @@ from codegen.calibration_source import calibration_source
 from codegen.can_document import can_document
 from codegen.can_names import can_names
 from codegen.can_sources import can_sources
+from codegen.pack_database import pack_database
+from codegen.pack_document import pack_document
+from codegen.pack_sources import pack_sources
 from codegen.rendering import write_files
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -26,3 +30,6 @@ if __name__ == "__main__":
     write_files(FIRMWARE / "generated", {**can_sources(), **sources})
     write_files(ROOT / "hil_sim" / "bus", can_names())
     write_files(ROOT / "docs", {"can.md": can_document(FIRMWARE)})
+    write_files(ROOT / "codegen" / "can", pack_database())  # before what is made of it
+    write_files(FIRMWARE / "pack" / "generated", pack_sources())
+    write_files(ROOT / "docs", {"can-pack.md": pack_document()})

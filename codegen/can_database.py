@@ -1,4 +1,4 @@
-"""The CAN database of the project, the single source of every message and signal."""
+"""The CAN databases of the project, of one cell and of a pack: every message and signal."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ DATA_IDS_ATTRIBUTE = "E2EProfile2DataIdList"
 OPTIONAL_ATTRIBUTE = "MessageIsOptional"
 BOOT_STAGE_ATTRIBUTE = "MessageIsFromBootStage"
 ECU, PLANT = "ECU", "PLANT"
+ONE_CELL, PACK = "bms.dbc", "pack.dbc"
+"""Files of the databases in codegen/can."""
 
 
-def database_text() -> str:
-    """Text of codegen/can/bms.dbc, as it is hashed and parsed."""
-    return (files("codegen") / "can" / "bms.dbc").read_text(encoding="utf-8")
+def database_text(name: str = ONE_CELL) -> str:
+    """Text of a database, as it is hashed and parsed."""
+    return (files("codegen") / "can" / name).read_text(encoding="utf-8")
 
 
-def database_digest() -> str:
-    """SHA-256 of bms.dbc, as hexadecimal text."""
-    return hashlib.sha256(database_text().encode()).hexdigest()
+def database_digest(name: str = ONE_CELL) -> str:
+    """SHA-256 of a database, as hexadecimal text."""
+    return hashlib.sha256(database_text(name).encode()).hexdigest()
 
 
-def load_database() -> Database:
-    """The database as cantools parses it: messages, signals, attributes."""
-    database = cantools.database.load_string(database_text(), database_format="dbc")
+def load_database(name: str = ONE_CELL) -> Database:
+    """A database as cantools parses it: messages, signals, attributes."""
+    database = cantools.database.load_string(database_text(name), database_format="dbc")
     assert isinstance(database, Database)
     return database
 

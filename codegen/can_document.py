@@ -42,7 +42,7 @@ def can_document(firmware: Path) -> str:
         .get_template("can.md.j2")
         .render(
             version=network_version(database),
-            messages=[_message(database, message) for message in messages],
+            messages=[described_message(database, message) for message in messages],
             crc=_crc(firmware),
             example=_example(database),
             limit_names=[name.removeprefix("E2E") for name in _LIMITS],
@@ -51,7 +51,8 @@ def can_document(firmware: Path) -> str:
     )
 
 
-def _message(database: Database, message: Message) -> dict[str, Any]:
+def described_message(database: Database, message: Message) -> dict[str, Any]:
+    """What a document says of a message."""
     timeout_ms = number_attribute(database, message, TIMEOUT_ATTRIBUTE)
     return {
         "name": message.name,
@@ -65,7 +66,7 @@ def _message(database: Database, message: Message) -> dict[str, Any]:
         "limits": [number_attribute(database, message, name) for name in _LIMITS],
         "data_ids": data_ids(message).hex(" "),
         "comment": message.comment,
-        "signals": [_signal(signal) for signal in message.signals],
+        "signals": [described_signal(signal) for signal in message.signals],
     }
 
 
@@ -104,7 +105,8 @@ def _example(database: Database) -> dict[str, str]:
     }
 
 
-def _signal(signal: Signal) -> dict[str, Any]:
+def described_signal(signal: Signal) -> dict[str, Any]:
+    """What a document says of a signal."""
     choices = {int(value): str(name) for value, name in (signal.choices or {}).items()}
     notes = [", ".join(f"{value} = {name}" for value, name in choices.items())]
     return {

@@ -61,7 +61,7 @@ def _catalogue(database: Database) -> dict[str, Any]:
         ]
         # The charge command ends a period for whoever waits for it.
         found.sort(key=lambda m: (m.name == "ChargeCommand", m.frame_id))
-        return [_message(database, m) for m in found]
+        return [message_fields(database, m) for m in found]
 
     signals = [s for m in database.messages for s in m.signals if s.unit]
     return {
@@ -70,11 +70,13 @@ def _catalogue(database: Database) -> dict[str, Any]:
         "received": messages(PLANT),
         "transmitted": messages(ECU),
         "boot_stage": messages(ECU, is_from_boot_stage=True),
-        "signals": [_signal(s) for s in signals],
+        "signals": [signal_fields(s) for s in signals],
     }
 
 
-def _message(database: Database, message: Message) -> dict[str, Any]:
+def message_fields(database: Database, message: Message) -> dict[str, Any]:
+    """What the templates need of a message: its place on the bus and its protection."""
+
     def number(name: str, of: Message = message) -> int:
         return number_attribute(database, of, name)
 
@@ -98,7 +100,8 @@ def _message(database: Database, message: Message) -> dict[str, Any]:
     }
 
 
-def _signal(signal: Signal) -> dict[str, Any]:
+def signal_fields(signal: Signal) -> dict[str, Any]:
+    """What the templates need of a physical signal."""
     offset_steps = round(signal.offset / signal.scale)
     # A whole number of steps keeps the zero exact and the rounding relative to the value.
     assert math.isclose(offset_steps * signal.scale, signal.offset, abs_tol=1e-9 * signal.scale)

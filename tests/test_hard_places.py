@@ -52,6 +52,7 @@ COMMANDS: dict[str, tuple[int, str]] = {
     "fault-matrix": (0, "--rows once --jobs 2 --out DIR/out"),
     "campaign": (0, "--runs 2 --jobs 2 --max-time-s 5 --out DIR/out"),
     "pack": (1, "--cells 3 --packs 2 --jobs 2 --max-time-s 5 --out DIR/out"),
+    "pack-budget": (0, "--cells 16"),
     "reproduce": (0, "--max-time-s 1 --jobs 2 --out DIR/out"),
     "bench": (0, "--quick --section period"),
     "plating": (0, "--temperatures 288.15,298.15 --soc 0,0.6,1 --out DIR/map.toml"),

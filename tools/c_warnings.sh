@@ -5,10 +5,10 @@ flags="-std=c99 -pedantic -Wall -Wextra -Werror -Wconversion -Wdouble-promotion 
 native=hil_sim/native runner=hil_sim/studies/campaign/native rivals=bms/studies/rivals/native programs=tests/firmware/native pack=hil_sim/studies/pack/native
 page=hil_sim/dashboard/native
 includes=""
-for part in include src generated image boot port host pack cost; do includes="$includes -Ifirmware_c/$part"; done
+for part in include src generated image boot port host pack pack/generated pack_ecu cost; do includes="$includes -Ifirmware_c/$part"; done
 
 for source in firmware_c/src/*.c firmware_c/generated/*.c firmware_c/image/*.c firmware_c/boot/*.c firmware_c/port/*.c \
-  firmware_c/host/*.c firmware_c/pack/*.c "$native"/*.c "$runner"/*.c "$pack"/*.c "$rivals"/*.c "$page"/*.c "$programs"/*.c; do
+  firmware_c/host/*.c firmware_c/pack/*.c firmware_c/pack/generated/*.c firmware_c/pack_ecu/*.c "$native"/*.c "$runner"/*.c "$pack"/*.c "$rivals"/*.c "$page"/*.c "$programs"/*.c; do
   ${CC:-cc} $flags $includes -I"$native" -I"$runner" -I"$pack" -I"$rivals" -I"$page" -I"$programs" "$source"
 done
 for source in firmware_c/port/linux/*.c hil_sim/bus/*.c; do # the operating system's own interface is beyond C99

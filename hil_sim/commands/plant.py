@@ -7,10 +7,12 @@ from typing import Annotated
 
 import typer
 
-from bms.commands.options import JsonOption, PresetOption
+from bms.commands.options import JsonOption, ModelOption, PresetOption
+from bms.errors import InputError
 from bms.presets import DEFAULT_PRESET, load_preset
-from hil_sim.commands import charge_mode, options
+from hil_sim.commands import charge_mode, options, pack_charge
 from hil_sim.commands.outcome import charge_and_report, charge_settings
+from hil_sim.pack.settings import SpreadKind
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.session import run_plant
 from hil_sim.run.settings import Settings
@@ -36,16 +38,39 @@ def plant(
     ] = 1.0,
     mode: charge_mode.ModeOption = None,
     full_by_s: charge_mode.FullByOption = None,
+    cells: pack_charge.CellsOption = None,
+    spread: pack_charge.SpreadOption = SpreadKind.PUBLISHED,
+    per_thermistor: pack_charge.PerThermistorOption = 1,
+    model: ModelOption = None,
 ) -> int:
     """Charge a simulated cell with whatever ECU is on the bus, for example `bms ecu`.
 
     Measurements, then SYNC start each control period, and the plant waits for the charge command;
     with --realtime it sends no SYNC and waits for nobody. Temperatures in K, currents in A
-    (negative while charging), times in s from the start of the charge. Exit code 1 when a limit is
-    crossed, or the charge fails or does not end in time.
+    (negative while charging), times in s from the start of the charge. With --cells it is a pack of
+    cells that differ, which takes only its own ECU: one of as many cells, of the same preset and
+    --model. Exit code 1 when a limit is crossed, or the charge fails or does not end in time.
 
     Example: bms plant --bus socketcan:vcan0 --seed 1 --out out/run
     """
+    if cells is not None:
+        pack_charge.refuse_options(
+            {
+                "--plant": cell != Settings.plant,
+                "--disturbance": disturbance is not DisturbanceKind.NONE,
+                "--faults": faults is not None,
+                "--realtime": realtime,
+                "--mode": mode is not None,
+                "--full-by-s": full_by_s is not None,
+            }
+        )
+        chosen = pack_charge.pack_settings(
+            preset, model, cells, bus, spread, per_thermistor, seed, max_time_s, answer_timeout_s
+        )
+        return pack_charge.plant_pack(chosen, out, as_json, log)
+    pack_charge.refuse_pack_options(spread, per_thermistor)
+    if model is not None:
+        raise InputError(f"--model {model}: is what a pack's ECU has to have; add --cells")
     settings = charge_settings(
         load_preset(preset), bus, seed, disturbance, faults, max_time_s, realtime, cell
     )

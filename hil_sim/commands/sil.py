@@ -13,9 +13,10 @@ from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.bus.buses import is_serial_line
-from hil_sim.commands import charge_mode, options
+from hil_sim.commands import charge_mode, options, pack_charge
 from hil_sim.commands.baselines import BaselineOption, baseline_settings
 from hil_sim.commands.outcome import charge_and_report, charge_settings
+from hil_sim.pack.settings import SpreadKind
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.session import run_sil
 from hil_sim.run.settings import ControllerKind, Settings
@@ -50,6 +51,9 @@ def sil(
     max_time_s: options.MaxTimeOption = 3600.0,
     mode: charge_mode.ModeOption = None,
     full_by_s: charge_mode.FullByOption = None,
+    cells: pack_charge.CellsOption = None,
+    spread: pack_charge.SpreadOption = SpreadKind.PUBLISHED,
+    per_thermistor: pack_charge.PerThermistorOption = 1,
 ) -> int:
     """Charge a simulated cell over a CAN bus with the ECU in the same process.
 
@@ -57,11 +61,31 @@ def sil(
     in QEMU: nothing of it runs here, and it has to name the given preset and model.
     Temperatures in K, currents in A (negative while charging), times in s from the start of the
     charge. The S-CBF baselines know the true state of the cell, as their method assumes; all others
-    see the bus only. Exit code 1 when the controller lets a limit be crossed, or the charge fails
-    or does not end in time.
+    see the bus only. With --cells it is a pack of cells that differ, under the ECU of a pack, and
+    the report has a heat map of its cells. Exit code 1 when the controller lets a limit be crossed,
+    or the charge fails or does not end in time.
 
     Example: bms sil --mode fastest --baseline s-cbf --baseline kan-rcbf-fixed --out out/run
     """
+    if cells is not None:
+        pack_charge.refuse_options(
+            {
+                "--controller": controller is not ControllerKind.KAN_RCBF,
+                "--baseline": bool(baseline),
+                "--target": target is not None,
+                "--plant": plant != Settings.plant,
+                "--disturbance": disturbance is not DisturbanceKind.NONE,
+                "--faults": faults is not None,
+                "--realtime": realtime,
+                "--mode": mode is not None,
+                "--full-by-s": full_by_s is not None,
+            }
+        )
+        chosen = pack_charge.pack_settings(
+            preset, model, cells, bus, spread, per_thermistor, seed, max_time_s
+        )
+        return pack_charge.sil_pack(chosen, out, as_json, log)
+    pack_charge.refuse_pack_options(spread, per_thermistor)
     with ExitStack() as stack:
         if target is not None:
             if bus != Settings.bus:

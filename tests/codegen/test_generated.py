@@ -17,6 +17,9 @@ from codegen.calibration_source import calibration_source
 from codegen.can_document import can_document
 from codegen.can_names import can_names
 from codegen.can_sources import can_sources
+from codegen.pack_database import pack_database
+from codegen.pack_document import pack_document
+from codegen.pack_sources import pack_sources
 from codegen.rendering import float_literal, write_files
 
 ROOT = Path(__file__).parents[2]
@@ -30,7 +33,14 @@ def regenerated() -> dict[str, str]:
 
 
 def everything_regenerated() -> dict[str, str]:
-    return {**regenerated(), **can_names(), "can.md": can_document(FIRMWARE)}
+    return {
+        **regenerated(),
+        **can_names(),
+        "can.md": can_document(FIRMWARE),
+        **pack_database(),
+        **pack_sources(),
+        "can-pack.md": pack_document(),
+    }
 
 
 def test_checked_in_sources_are_what_the_generator_writes() -> None:
@@ -51,12 +61,23 @@ def test_checked_in_names_of_the_bus_are_what_the_generator_writes() -> None:
     assert written.read_text(encoding="utf-8") == text, "run 'make generate'"
 
 
+def test_checked_in_database_tables_and_document_of_packs_are_what_the_generator_writes() -> None:
+    places = {
+        ROOT / "codegen" / "can": pack_database(),
+        FIRMWARE / "pack" / "generated": pack_sources(),
+        ROOT / "docs": {"can-pack.md": pack_document()},
+    }
+    for folder, fresh in places.items():
+        for name, text in fresh.items():
+            assert (folder / name).read_text(encoding="utf-8") == text, f"{name}: 'make generate'"
+
+
 def test_generation_is_deterministic() -> None:
     assert everything_regenerated() == everything_regenerated()
 
 
 def test_generated_files_say_where_they_come_from_and_carry_no_date() -> None:
-    for name, text in {**regenerated(), **can_names()}.items():
+    for name, text in {**regenerated(), **can_names(), **pack_sources()}.items():
         head = text[:600].lower()
         assert "generated" in head, name
         assert "202" not in head.split("sha-256")[0], name

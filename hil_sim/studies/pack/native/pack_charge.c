@@ -3,13 +3,19 @@
 #include <math.h>
 #include <stddef.h>
 
-static double reading_of(const pack_charge_t *charge, const pack_sensor_t *sensor, double truth,
-                         double normal)
+double pack_sensor_reading(const pack_sensor_t *sensor, double truth, double normal,
+                           double noise_cutoff)
 {
-    const double cut = fmin(fmax(normal, -charge->noise_cutoff), charge->noise_cutoff);
+    const double cut = fmin(fmax(normal, -noise_cutoff), noise_cutoff);
     const double value = truth + sensor->noise_std * cut;
     return (sensor->resolution == 0.0) ? value
                                        : sensor->resolution * rint(value / sensor->resolution);
+}
+
+static float reading_of(const pack_charge_t *charge, const pack_sensor_t *sensor, double truth,
+                        double normal)
+{
+    return (float)pack_sensor_reading(sensor, truth, normal, charge->noise_cutoff);
 }
 
 void pack_charge_begin(pack_charge_t *charge, const pack_config_t *config)
@@ -38,38 +44,50 @@ static double mean_of(const float *values, uint32_t count)
 }
 
 /* Two normal numbers are each cell's, for its voltage and its surface. */
-static void ask_core(pack_charge_t *charge, const double *normals)
+void pack_charge_measure(pack_charge_t *charge, const double *normals, pack_measured_t *measured)
 {
-    const plant_t *plant = &charge->plant;
+    plant_t *plant = &charge->plant;
     const double *shared = &normals[2u * plant->cells];
     const double outlet_K = plant->cell[plant->cells - 1u].memory.state.coolant;
-    float voltage_V[BMS_MAX_CELLS];
-    float surface_K[BMS_MAX_CELLS];
+    plant->cooling_power_W =
+        charge->full_cooling_W *
+        fmin(fmax((outlet_K - charge->coolant_floor_K) / charge->cooling_band_K, 0.0), 1.0);
     for (uint32_t i = 0u; i < charge->seen; i++) {
         const uint32_t cell = charge->seen_cell[i];
-        voltage_V[i] = (float)reading_of(charge, &charge->voltage,
-                                         plant_voltage_V(plant, cell, charge->current_A),
-                                         normals[2u * cell]);
+        measured->voltage_V[i] = reading_of(charge, &charge->voltage,
+                                            plant_voltage_V(plant, cell, charge->current_A),
+                                            normals[2u * cell]);
     }
     const uint32_t thermistors = charge->sees_mean ? charge->seen : charge->pack.thermistors;
     for (uint32_t i = 0u; i < thermistors; i++) {
         const uint32_t cell = charge->thermistor_cell[i];
-        surface_K[i] = (float)reading_of(charge, &charge->surface,
-                                         plant->cell[cell].memory.state.surface,
-                                         normals[2u * cell + 1u]);
+        measured->surface_temperature_K[i] =
+            reading_of(charge, &charge->surface, plant->cell[cell].memory.state.surface,
+                       normals[2u * cell + 1u]);
     }
     if (charge->sees_mean) {
-        voltage_V[0] = (float)mean_of(voltage_V, charge->seen);
-        surface_K[0] = (float)mean_of(surface_K, charge->seen);
+        measured->voltage_V[0] = (float)mean_of(measured->voltage_V, charge->seen);
+        measured->surface_temperature_K[0] =
+            (float)mean_of(measured->surface_temperature_K, charge->seen);
     }
+    measured->current_A = reading_of(charge, &charge->current, charge->current_A, shared[0]);
+    measured->coolant_in_K = reading_of(charge, &charge->coolant, plant->inlet_K, shared[1]);
+    measured->coolant_out_K = reading_of(charge, &charge->coolant, outlet_K, shared[2]);
+    measured->cooling_power_W =
+        reading_of(charge, &charge->power, plant->cooling_power_W, shared[3]);
+}
+
+static void ask_core(pack_charge_t *charge, const double *normals)
+{
+    pack_measured_t measured;
+    pack_charge_measure(charge, normals, &measured);
     const pack_readings_t readings = {
-        .current_A = (float)reading_of(charge, &charge->current, charge->current_A, shared[0]),
-        .voltage_V = voltage_V,
-        .surface_temperature_K = surface_K,
-        .coolant_in_K = (float)reading_of(charge, &charge->coolant, plant->inlet_K, shared[1]),
-        .coolant_out_K = (float)reading_of(charge, &charge->coolant, outlet_K, shared[2]),
-        .cooling_power_W =
-            (float)reading_of(charge, &charge->power, plant->cooling_power_W, shared[3]),
+        .current_A = measured.current_A,
+        .voltage_V = measured.voltage_V,
+        .surface_temperature_K = measured.surface_temperature_K,
+        .coolant_in_K = measured.coolant_in_K,
+        .coolant_out_K = measured.coolant_out_K,
+        .cooling_power_W = measured.cooling_power_W,
         .charge = charge->requested,
         .reference_current_A = (float)charge->reference_current_A,
         .plug_in_soc = charge->plug_in_soc,
@@ -92,10 +110,6 @@ static pack_outcome_t outcome_of(const pack_charge_t *charge)
 static void run_period(pack_charge_t *charge, const double *normals)
 {
     plant_t *plant = &charge->plant;
-    const double outlet_K = plant->cell[plant->cells - 1u].memory.state.coolant;
-    plant->cooling_power_W =
-        charge->full_cooling_W *
-        fmin(fmax((outlet_K - charge->coolant_floor_K) / charge->cooling_band_K, 0.0), 1.0);
     ask_core(charge, normals);
     const double command_A =
         fmin(fmax((double)charge->pack.command_A, charge->reference_current_A), 0.0);

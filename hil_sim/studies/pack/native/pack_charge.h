@@ -55,12 +55,28 @@ typedef struct {
     uint32_t governed[BMS_MAX_CELLS]; /* periods in which each cell limited the current */
 } pack_charge_t;
 
+/* What the sensors read in a period, of each cell that the controller sees. */
+typedef struct {
+    float current_A;
+    float coolant_in_K;
+    float coolant_out_K;
+    float cooling_power_W;
+    float voltage_V[BMS_MAX_CELLS];
+    float surface_temperature_K[BMS_MAX_CELLS]; /* of each thermistor */
+} pack_measured_t;
+
 /* Prepares a charge whose members down to plug_in_soc are set and whose others are zero. */
 void pack_charge_begin(pack_charge_t *charge, const pack_config_t *config);
 
 /* Runs up to `periods` control periods, with two standard normal numbers for each cell and
  * PACK_SHARED_NORMALS for each of them. */
 void pack_charge_advance(pack_charge_t *charge, const double *normals, uint32_t periods);
+
+/* Sets the cooling of a period and reads the sensors, with the standard normal numbers of one. */
+void pack_charge_measure(pack_charge_t *charge, const double *normals, pack_measured_t *measured);
+
+double pack_sensor_reading(const pack_sensor_t *sensor, double truth, double normal,
+                           double noise_cutoff);
 
 /* Steps a pack over and over with these readings, one set after the other, for its time. */
 void pack_repeat(pack_t *pack, const pack_readings_t *readings, uint32_t sets, uint32_t periods);

@@ -1,0 +1,191 @@
+"""What `bms sil`, `bms plant` and `bms ecu` do with --cells: a pack in place of one cell."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any, Protocol
+
+import typer
+from rich.console import Console
+
+from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.errors import InputError
+from bms.model.pair import load_pair
+from bms.text_table import TextTable
+from bms.waiting import waiting
+from hil_sim.bus.buses import open_bus, require_shared
+from hil_sim.commands.stopping import stop_event
+from hil_sim.logs import usable_format
+from hil_sim.logs.recorder import Recorder
+from hil_sim.nodes.ecu import EcuNode
+from hil_sim.pack.charge import PackResult, charge_pack, charge_pack_elsewhere
+from hil_sim.pack.ecu import PackEcu
+from hil_sim.pack.report import write_pack_report
+from hil_sim.pack.settings import PackChargeSettings, SpreadKind
+from hil_sim.pack.summary import has_passed, summary
+from hil_sim.report.folder import OutputFolder
+
+CellsOption = Annotated[
+    int | None,
+    typer.Option("--cells", min=1, help="A pack of so many cells in series. Default: one cell."),
+]
+SpreadOption = Annotated[
+    SpreadKind, typer.Option("--spread", help="How the cells of a pack differ; with --cells.")
+]
+PerThermistorOption = Annotated[
+    int,
+    typer.Option("--per-thermistor", min=1, help="Cells for each thermistor; with --cells."),
+]
+
+
+class Charge(Protocol):
+    """A way to charge a pack."""
+
+    def __call__(
+        self, settings: PackChargeSettings, recorder: Recorder | None = None, progress: Any = ...
+    ) -> PackResult:
+        """Charge to the end; `progress` is told the greatest state of charge."""
+        ...
+
+
+def refuse_options(given: Mapping[str, bool]) -> None:
+    """Raise InputError for the first option that is given and means one cell only."""
+    for option, is_given in given.items():
+        if is_given:
+            raise InputError(f"{option}: is for one cell; leave it out, or --cells")
+
+
+def refuse_pack_options(spread: SpreadKind, per_thermistor: int) -> None:
+    """Raise InputError for an option that means a pack, without --cells."""
+    if spread is not SpreadKind.PUBLISHED or per_thermistor != 1:
+        raise InputError("--spread, --per-thermistor: are for a pack; add --cells")
+
+
+def pack_settings(
+    preset: str,
+    model: Path | str | None,
+    cells: int,
+    bus: str,
+    spread: SpreadKind,
+    per_thermistor: int = 1,
+    seed: int = 0,
+    max_time_s: float = 3600.0,
+    answer_timeout_s: float = 1.0,
+) -> PackChargeSettings:
+    """What the options say. Raises InputError or ModelMismatchError."""
+    chosen, estimator = load_pair(preset, model)
+    settings = PackChargeSettings(
+        chosen,
+        estimator,
+        cells,
+        bus=bus,
+        spread=spread,
+        seed=seed,
+        per_thermistor=per_thermistor,
+        max_time_s=max_time_s,
+        answer_timeout_s=answer_timeout_s,
+    )
+    settings.core()  # what cannot be is said before a run
+    return settings
+
+
+def charge_and_report_pack(
+    settings: PackChargeSettings,
+    charge: Charge,
+    out: Path | None,
+    as_json: bool,
+    log: Path | None,
+) -> int:
+    """Charge a pack, print and write what came of it, and return the exit code."""
+    with ExitStack() as stack:
+        folder = stack.enter_context(OutputFolder(out)) if out is not None else None
+        log_folder = None
+        if log is not None:
+            usable_format(log)
+            log_folder = stack.enter_context(OutputFolder(log.parent, "--log"))
+        with ExitStack() as during_run:
+            paths = [folder.path("can.log")] if folder is not None else []
+            if log is not None and log_folder is not None:
+                paths.append(log_folder.path(log.name))
+            recorder = during_run.enter_context(Recorder(*paths)) if paths else None
+            wait = during_run.enter_context(waiting("charging", 100, "% state of charge"))
+            done = 0
+
+            def follow(soc: float) -> None:
+                nonlocal done
+                step = int(100.0 * soc) - done
+                if step > 0:
+                    wait.advance(step)
+                    done += step
+
+            result = charge(settings, recorder, follow)
+        if folder is not None:
+            write_pack_report(folder, result)
+            folder.commit()
+        if log_folder is not None:
+            log_folder.commit()
+    if as_json:
+        print(json.dumps(summary(result), indent=2))
+    else:
+        _print(result)
+    return EXIT_DONE if has_passed(result) else EXIT_CHECK_FAILED
+
+
+def sil_pack(
+    settings: PackChargeSettings, out: Path | None, as_json: bool, log: Path | None
+) -> int:
+    """Plant and ECU of a pack in this process."""
+    return charge_and_report_pack(settings, charge_pack, out, as_json, log)
+
+
+def plant_pack(
+    settings: PackChargeSettings, out: Path | None, as_json: bool, log: Path | None
+) -> int:
+    """The plant of a pack, with its ECU in another process."""
+    return charge_and_report_pack(settings, charge_pack_elsewhere, out, as_json, log)
+
+
+def ecu_pack(settings: PackChargeSettings, silence_s: float) -> int:
+    """A pack's ECU until the bus falls silent, or until Ctrl-C or SIGTERM."""
+    require_shared(settings.bus)
+    ecu = PackEcu(settings)
+    stop = stop_event()
+    with open_bus(settings.bus) as connection:
+        if sys.stderr.isatty():
+            print(
+                f"ECU of {settings.cells} cells on {settings.bus}; Ctrl-C ends it", file=sys.stderr
+            )
+        node = EcuNode(connection, ecu)
+        node.run(silence_s, stop.is_set)
+    print(f"ECU on {settings.bus}: {node.frames} frames received, {node.steps} steps")
+    return EXIT_DONE
+
+
+def _print(result: PackResult) -> None:
+    content = summary(result)
+    table = TextTable(
+        "cell", "core K", "surface K", "voltage mV", "soc", "governed s",
+        title=f"{content['cells']} cells of {content['preset']}: {content['stop_reason']} after "
+        f"{content['charge_time_s']:.1f} s; left of each limit at worst",
+    )  # fmt: skip
+    rows = sorted(content["worst_margins"], key=lambda row: float(row["core_temperature_K"]))
+    for row in rows[:8]:
+        table.add_row(
+            str(row["cell"]),
+            f"{row['core_temperature_K']:.2f}",
+            f"{row['surface_temperature_K']:.2f}",
+            f"{1000.0 * row['voltage_V']:.1f}",
+            f"{row['soc']:.4f}",
+            f"{content['governed_s'].get(str(row['cell']), 0.0):.1f}",
+        )
+    console = Console()
+    table.print(console)
+    fault = f"; first fault {content['first_fault']}" if content["first_fault"] else ""
+    console.print(
+        f"{content['cells_over']} cells over a limit{fault}; {content['frames_per_period']:.1f} "
+        f"frames a period, {content['times_real_time']:.0f} times real time"
+    )

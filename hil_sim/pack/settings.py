@@ -1,0 +1,93 @@
+"""What determines a charge of one pack over a bus."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import lru_cache
+
+from bms.bus_signals import BUS
+from bms.errors import InputError
+from bms.model.model_file import KanModel
+from bms.presets import Preset
+from bms.presets.schema import Sensor
+from hil_sim.studies.pack._pack import lib
+from hil_sim.studies.pack.engine import Core, View, all_cells
+from hil_sim.studies.pack.reserves import reserves
+from hil_sim.studies.pack.spread import Spread, Surroundings
+
+_EQUAL = (1.0, 1.0)
+NO_SPREAD = Spread(_EQUAL, _EQUAL, _EQUAL, _EQUAL, _EQUAL, start_soc=0.0)
+
+
+class SpreadKind(str, Enum):
+    """How the cells of a pack differ."""
+
+    PUBLISHED = "published"
+    NONE = "none"
+
+    @property
+    def spread(self) -> Spread:
+        """Intervals of the factors on a cell's parameters."""
+        return Spread() if self is SpreadKind.PUBLISHED else NO_SPREAD
+
+
+@dataclass(frozen=True)
+class PackChargeSettings:
+    """One pack on one bus. Raises InputError for numbers of cells that cannot be."""
+
+    preset: Preset
+    model: KanModel
+    cells: int
+    bus: str = "virtual:bms"
+    spread: SpreadKind = SpreadKind.PUBLISHED
+    seed: int = 0
+    per_thermistor: int = 1
+    max_time_s: float = 3600.0
+    disturbed: bool = True
+    answer_timeout_s: float = 1.0
+    around: Surroundings = field(default_factory=Surroundings)
+
+    def __post_init__(self) -> None:
+        is_family = self.preset.cell.interval is not None
+        most = lib.BMS_MAX_FAMILY_CELLS if is_family else lib.BMS_MAX_CELLS
+        if not 1 <= self.cells <= most:
+            raise InputError(f"--cells {self.cells}: from 1 to {most} cells fit into a pack")
+        if is_family and self.per_thermistor != 1:
+            raise InputError(
+                f"--per-thermistor {self.per_thermistor}: preset '{self.preset.name}' states a "
+                "family, each cell of which needs a thermistor; leave it out"
+            )
+
+    @property
+    def view(self) -> View:
+        """Which cells have a thermistor; all are seen."""
+        return all_cells(self.cells, self.per_thermistor)
+
+    def core(self) -> Core:
+        """Constants of the control core, with what the spread needs in reserve.
+
+        Raises InputError as `reserves` and ModelMismatchError as calibration_fields does.
+        """
+        kept = _reserves(self.preset, self.spread.spread, self.around)
+        return Core(self.preset, self.model, kept)
+
+    @property
+    def pack_voltage_sensor(self) -> Sensor:
+        """The sensor across the whole string, as the cells' are over as many."""
+        own = self.preset.sensors.voltage_V
+        share = self.cells**0.5
+        return Sensor(resolution=10.0 * own.resolution, noise_std=share * own.noise_std, bias=0.0)
+
+    @property
+    def pack_voltage_error_V(self) -> float:
+        """By which the sum of the cells' readings may miss that of the string, with its frame."""
+        cell_V = self.preset.sensors.voltage_V.error_bound + BUS.voltage_V
+        return self.cells * cell_V + self.pack_voltage_sensor.error_bound + PACK_VOLTAGE_STEP_V
+
+
+_reserves = lru_cache(maxsize=8)(reserves)
+"""A second to compute, for plant, ECU and every further run."""
+
+PACK_VOLTAGE_STEP_V = 0.01
+"""Half a step of PackVoltage; a test holds it to the database."""
