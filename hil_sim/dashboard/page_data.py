@@ -44,7 +44,12 @@ def config_data(
     Only a server can make the calibration of limits that are asked for.
     """
     others = [name for name in preset_names() if name != chosen]
-    return {"bus": bus, "presets": [chosen, *others], "makes_limits": makes_limits}
+    return {
+        "bus": bus,
+        "presets": [chosen, *others],
+        "packs": DEFAULT_PRESET,
+        "makes_limits": makes_limits,
+    }
 
 
 @cache

@@ -33,6 +33,7 @@ from bms.errors import InputError, ModelMismatchError
 from bms.model.pair import load_pair
 from hil_sim.dashboard.build import STATIC
 from hil_sim.dashboard.feed import BusFeed
+from hil_sim.dashboard.pack_scenario import packs_data
 from hil_sim.dashboard.page_data import (
     config_data,
     database_data,
@@ -77,6 +78,7 @@ def make_app(
         place, of_it = places[name] = (preset, model) if name == chosen.name else (name, None)
         makers[name] = partial(preset_data, place, of_it)
         makers[f"{name}.rows"] = partial(rows_data, place)
+    makers[f"{config['packs']}.packs"] = partial(packs_data, config["packs"])
     data = _Data(makers)
     threading.Thread(target=data.prepare, args=(chosen.name,), daemon=True).start()
 

@@ -2,8 +2,8 @@
 
     python -m tests.hil_sim.dashboard_page
 
-draws docs/images/browser.png, browser-fault.png and browser-limits.png. To run again after the page
-has changed.
+draws docs/images/browser.png, browser-fault.png, browser-limits.png and browser-pack.png.
+To run again after the page has changed.
 """
 
 from __future__ import annotations
@@ -145,6 +145,17 @@ def draw_limits(page: Any, path: Path) -> None:
     page.locator("#limits").screenshot(path=path)
 
 
+def draw_pack_page(page: Any, path: Path) -> None:
+    """The page of a pack while one of its cells takes current away."""
+    page.select_option("#speed", label="100 times")
+    page.get_by_role("button", name="Charge anew").click()
+    page.locator("#governs", has_text="governs, by its core").wait_for()
+    page.focus('#heat button[data-governs="true"]')
+    page.select_option("#speed", label="real time")
+    page.wait_for_timeout(300)
+    page.screenshot(path=path)
+
+
 def main() -> None:
     """Draw the pictures of the documentation."""
     with dashboard() as (address, _), browser() as started:
@@ -154,6 +165,10 @@ def main() -> None:
         draw_charge(page, PICTURES / "browser.png")
         draw_fault(page, PICTURES / "browser-fault.png")
         draw_limits(page, PICTURES / "browser-limits.png")
+        page.goto(f"{address}pack.html")
+        page.set_viewport_size({"width": 1100, "height": 480})
+        page.wait_for_selector("#heat button")
+        draw_pack_page(page, PICTURES / "browser-pack.png")
 
 
 if __name__ == "__main__":

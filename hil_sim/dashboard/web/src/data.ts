@@ -78,6 +78,7 @@ export interface Row {
 export interface Config {
   bus: string | null; // that is shown live
   presets: string[]; // the first is the one to begin with
+  packs: string; // the preset that there are packs of
   makes_limits: boolean; // there is a server that makes the calibration of tighter limits
 }
 
