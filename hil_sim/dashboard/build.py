@@ -15,11 +15,11 @@ from pathlib import Path
 
 from bms.errors import InputError
 from bms.native_build import ROOT
-from hil_sim.dashboard.module import compile_module, sources
+from hil_sim.dashboard.module import compile_module, compile_pack_module, sources
 
 FOLDER = Path(__file__).parent
 STATIC = FOLDER / "static"
-MODULE = "page.wasm"
+MODULE, PACK_MODULE = "page.wasm", "pack.wasm"
 _WEB = FOLDER / "web"
 _MARK = "built-from"
 _NOT_SOURCES = ("node_modules", "dist")
@@ -35,6 +35,7 @@ def build(out: Path = STATIC) -> None:
     shutil.rmtree(out, ignore_errors=True)
     _run([npm, "run", "build", "--", "--outDir", str(out.resolve()), "--emptyOutDir"])
     compile_module(out / MODULE)
+    compile_pack_module(out / PACK_MODULE)
     (out / _MARK).write_text(f"{_sources_hash()}\n", encoding="ascii")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
 
@@ -17,14 +18,20 @@ from hil_sim.monitor.presets import PresetFinder
 from hil_sim.nodes.clock import Clock
 
 _LISTEN_S = 0.1
+_FIRST_WAIT_S = 0.5
+_LONGEST_WAIT_S = 8.0
 
 
 class BusFeed(Closing):
-    """Listens to a bus from its making on; nothing is ever sent."""
+    """Listens to a bus from its making on; nothing is ever sent.
+
+    A bus that is lost is opened again, after longer and longer waits.
+    """
 
     def __init__(self, bus: str, finder: PresetFinder, clock: Clock) -> None:
         """BusError in one line when the bus cannot be opened."""
-        self._listener = Listener(bus)
+        self._bus = bus
+        self._listener: Listener | None = Listener(bus)
         self._finder = finder
         self._clock = clock
         self._start_s = clock.now_s()
@@ -37,8 +44,9 @@ class BusFeed(Closing):
 
     def message(self) -> dict[str, Any]:
         """What is known now, or why nothing is heard any more."""
-        if self._error is not None:
-            return {"error": self._error}
+        error = self._error
+        if error is not None:
+            return {"error": error}
         with self._lock:
             now_s = self._clock.now_s()
             snapshot, frames = self._model.snapshot(now_s), self._model.frames
@@ -58,18 +66,33 @@ class BusFeed(Closing):
         """End listening and close the connection to the bus."""
         self._is_closed.set()
         self._thread.join()
-        self._listener.close()
+        if self._listener is not None:
+            self._listener.close()
 
     def _listen(self) -> None:
+        wait_s = _FIRST_WAIT_S
         while not self._is_closed.is_set():
             try:
+                if self._listener is None:
+                    self._listener = Listener(self._bus)
                 frame = self._listener.receive(_LISTEN_S)
             except BusError as error:
-                self._error = str(error)
-                return
+                self._lose(error)
+                self._is_closed.wait(wait_s)
+                wait_s = min(2.0 * wait_s, _LONGEST_WAIT_S)
+                continue
+            self._error = None
             if frame is not None:
+                wait_s = _FIRST_WAIT_S
                 with self._lock:
                     self._model.take(self._clock.now_s(), frame)
+
+    def _lose(self, error: BusError) -> None:
+        self._error = str(error)
+        if self._listener is not None:
+            with suppress(BusError, OSError):
+                self._listener.close()
+            self._listener = None
 
 
 def _data(snapshot: Snapshot) -> dict[str, Any]:

@@ -23,6 +23,17 @@ HEADERS = (
     *(f"{NATIVE}/{name}.h" for name in ("normals", "session")),
 )
 """What declares session_scenario_t, in order."""
+_PACK = "hil_sim/studies/pack/native"
+_PACK_PAGE = "hil_sim/dashboard/native_pack"
+PACK_HEADERS = (
+    *CORE_HEADERS,
+    "firmware_c/pack/pack.h",
+    f"{_CELL}/cell.h",
+    *(f"{_PACK}/{name}.h" for name in ("plant", "pack_charge")),
+    f"{NATIVE}/normals.h",
+    f"{_PACK_PAGE}/pack_scenario.h",
+)
+"""What declares pack_scenario_t, in order."""
 _FOLDERS = (*CORE_FOLDERS, _CELL, _CHARGE, NATIVE)
 _FOR_A_HOST_ONLY = ("socketcan_batch.c",)
 # As the extensions are compiled; a reactor has functions to call, and no start of its own.
@@ -30,18 +41,36 @@ _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-s")
 _TARGET = ("-target", "wasm32-wasi", "-mexec-model=reactor")
 
 
+_PACK_FOLDERS = (*CORE_FOLDERS, "firmware_c/pack", _CELL, _PACK, NATIVE, _PACK_PAGE)
+_ONE_CELL_ONLY = ("page.c", "page.h", "session.c", "session.h")
+
+
 def sources(root: Path = ROOT) -> list[Path]:
-    """Everything that the module is compiled from."""
+    """Everything that the modules are compiled from."""
+    return sorted({*_sources(root, _FOLDERS), *_sources(root, _PACK_FOLDERS)})
+
+
+def _sources(root: Path, folders: tuple[str, ...], without: tuple[str, ...] = ()) -> list[Path]:
     return [
         path
-        for folder in _FOLDERS
+        for folder in folders
         for path in sorted((root / folder).glob("*.[ch]"))
-        if path.name not in _FOR_A_HOST_ONLY
+        if path.name not in (*_FOR_A_HOST_ONLY, *without)
     ]
 
 
 def compile_module(path: Path, root: Path = ROOT) -> None:
-    """Write the module to a path.
+    """Write the module of a charge of one cell to a path; InputError as below."""
+    _compile(path, root, _FOLDERS, _sources(root, _FOLDERS))
+
+
+def compile_pack_module(path: Path, root: Path = ROOT) -> None:
+    """Write the module of a pack to a path; InputError as below."""
+    _compile(path, root, _PACK_FOLDERS, _sources(root, _PACK_FOLDERS, _ONE_CELL_ONLY))
+
+
+def _compile(path: Path, root: Path, folders: tuple[str, ...], files: list[Path]) -> None:
+    """Write a module to a path.
 
     Raises InputError without a compiler (ziglang from PyPI), or with what it complains of.
     """
@@ -52,8 +81,8 @@ def compile_module(path: Path, root: Path = ROOT) -> None:
         )
     command = (
         *(sys.executable, "-m", "ziglang", "cc", *_TARGET, *_FLAGS),
-        *(f"-I{folder}" for folder in _FOLDERS),
-        *(str(p.relative_to(root)) for p in sources(root) if p.suffix == ".c"),
+        *(f"-I{folder}" for folder in folders),
+        *(str(p.relative_to(root)) for p in files if p.suffix == ".c"),
         *("-o", str(path.resolve())),
     )
     done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)

@@ -6,18 +6,20 @@ A server makes it on demand, `hil_sim.dashboard.site` as files.
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from bms.calibration.plausibility import plausibility_fields
+from bms.model.model_file import KanModel
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET, Preset, load_preset, preset_names
 from codegen import can_database
 from hil_sim.bus.catalog import FirstFault
 from hil_sim.bus.database import load_codecs
+from hil_sim.dashboard.limits import tightened
 from hil_sim.dashboard.scenario import scenario_bytes
 from hil_sim.fault_matrix.matrix import Row, fault_numbers, load_matrix
 from hil_sim.fault_matrix.place import nominal_initial, nominal_onset
@@ -34,10 +36,20 @@ _LIMITS = {
 }
 
 
-def config_data(bus: str | None, chosen: str = DEFAULT_PRESET) -> dict[str, Any]:
-    """What there is to show: a bus or none, and the presets, the chosen one first."""
+def config_data(
+    bus: str | None, chosen: str = DEFAULT_PRESET, makes_limits: bool = False
+) -> dict[str, Any]:
+    """What there is to show: a bus or none, and the presets, the chosen one first.
+
+    Only a server can make the calibration of limits that are asked for.
+    """
     others = [name for name in preset_names() if name != chosen]
-    return {"bus": bus, "presets": [chosen, *others]}
+    return {
+        "bus": bus,
+        "presets": [chosen, *others],
+        "packs": DEFAULT_PRESET,
+        "makes_limits": makes_limits,
+    }
 
 
 @cache
@@ -75,7 +87,24 @@ def preset_data(name: str, model_path: Path | None = None) -> dict[str, Any]:
 
     Raises InputError or ModelMismatchError as load_pair.
     """
-    preset, model = load_pair(name, model_path)
+    return _preset_data(*load_pair(name, model_path))
+
+
+def tightened_data(name: str, model_path: Path | None, wanted: Mapping[str, str]) -> dict[str, Any]:
+    """A preset with lower limits as preset_data, with its file and its rows of the fault matrix.
+
+    Raises InputError as `tightened`, and as load_pair.
+    """
+    _, own = load_pair(name, model_path)
+    preset, text = tightened(name, wanted)
+    return {
+        "preset": _preset_data(*load_pair(preset, own)),
+        "rows": _rows_data(preset),
+        "file": text,
+    }
+
+
+def _preset_data(preset: Preset, model: KanModel) -> dict[str, Any]:
     box = preset.operating_box
     coldest_K, hottest_K = box.surface_temperature_K
     low_W, high_W = box.cooling_power_W
@@ -106,7 +135,10 @@ def rows_data(name: str) -> list[dict[str, Any]]:
 
     Raises InputError as load_preset.
     """
-    preset = load_preset(name)
+    return _rows_data(load_preset(name))
+
+
+def _rows_data(preset: Preset) -> list[dict[str, Any]]:
     return [_row_data(row, preset) for row in load_matrix() if not row.realtime]
 
 

@@ -23,17 +23,24 @@ from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import JSONResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from bms.errors import InputError
+from bms.errors import InputError, ModelMismatchError
 from bms.model.pair import load_pair
 from hil_sim.dashboard.build import STATIC
 from hil_sim.dashboard.feed import BusFeed
-from hil_sim.dashboard.page_data import config_data, database_data, preset_data, rows_data
+from hil_sim.dashboard.pack_scenario import packs_data
+from hil_sim.dashboard.page_data import (
+    config_data,
+    database_data,
+    preset_data,
+    rows_data,
+    tightened_data,
+)
 
 Maker = Callable[[], object]
 """Makes what becomes JSON."""
@@ -64,14 +71,19 @@ def make_app(
     ModelMismatchError as load_pair.
     """
     chosen, _ = load_pair(preset, model)
-    config = config_data(bus, chosen.name)
+    config = config_data(bus, chosen.name, makes_limits=True)
     makers: dict[str, Maker] = {"config": lambda: config, "database": database_data}
+    places: dict[str, tuple[str, Path | None]] = {}
     for name in config["presets"]:
-        place, of_it = (preset, model) if name == chosen.name else (name, None)
+        place, of_it = places[name] = (preset, model) if name == chosen.name else (name, None)
         makers[name] = partial(preset_data, place, of_it)
         makers[f"{name}.rows"] = partial(rows_data, place)
+    makers[f"{config['packs']}.packs"] = partial(packs_data, config["packs"])
     data = _Data(makers)
     threading.Thread(target=data.prepare, args=(chosen.name,), daemon=True).start()
+
+    async def limits(request: Request) -> Response:
+        return await _limits(request, places)
 
     async def websocket(socket: WebSocket) -> None:
         await _feed(socket, feed)
@@ -79,6 +91,7 @@ def make_app(
     return Starlette(
         routes=[
             Route("/data/{name}.json", data.answer),
+            Route("/limits/{name}.json", limits),
             WebSocketRoute("/feed", websocket),
             Mount("/", StaticFiles(directory=STATIC, html=True)),
         ],
@@ -139,6 +152,18 @@ def is_own_origin(origin: str | None, host: str | None) -> bool:
     """Whether a websocket is opened by the page of this server. A browser always tells its origin;
     what tells none is no browser."""
     return origin is None or urlsplit(origin).netloc == host
+
+
+async def _limits(request: Request, places: Mapping[str, tuple[str, Path | None]]) -> Response:
+    """A preset with the limits of the query, or why not."""
+    name: str = request.path_params["name"]
+    if name not in places:
+        raise HTTPException(404)
+    try:
+        made = await run_in_threadpool(tightened_data, *places[name], request.query_params)
+    except (InputError, ModelMismatchError) as error:
+        return JSONResponse({"error": str(error)})
+    return JSONResponse(made)
 
 
 async def _feed(socket: WebSocket, feed: BusFeed | None) -> None:

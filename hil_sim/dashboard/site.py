@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 from hil_sim.dashboard.build import STATIC, require_page
+from hil_sim.dashboard.pack_scenario import packs_data
 from hil_sim.dashboard.page_data import config_data, database_data, preset_data, rows_data
 
 
@@ -20,6 +21,7 @@ def write_site(out: Path) -> None:
     shutil.copytree(STATIC, out, dirs_exist_ok=True)
     config = config_data(bus=None)
     data: dict[str, object] = {"config": config, "database": database_data()}
+    data[f"{config['packs']}.packs"] = packs_data(config["packs"])
     for name in config["presets"]:
         data[name] = preset_data(name)
         data[f"{name}.rows"] = rows_data(name)

@@ -2,7 +2,8 @@
 
     python -m tests.hil_sim.dashboard_page
 
-draws docs/images/browser.png and browser-fault.png. To run again after the page has changed.
+draws docs/images/browser.png, browser-fault.png, browser-limits.png and browser-pack.png.
+To run again after the page has changed.
 """
 
 from __future__ import annotations
@@ -94,14 +95,26 @@ def inject(page: Any, name: str) -> None:
     page.get_by_role("button", name=name, exact=True).click()
 
 
-def saved_log(page: Any, folder: Path) -> Path:
-    """can.log as the page hands it out."""
+def saved(page: Any, folder: Path, name: str) -> Path:
+    """A file as the page hands it out."""
     with page.expect_download() as download:
-        page.get_by_role("button", name="Save can.log").click()
-    assert download.value.suggested_filename == "can.log"
-    path = folder / "can.log"
+        page.get_by_role("button", name=f"Save {name}").click()
+    assert download.value.suggested_filename == name
+    path = folder / name
     download.value.save_as(path)
     return path
+
+
+def saved_log(page: Any, folder: Path) -> Path:
+    """can.log as the page hands it out."""
+    return saved(page, folder, "can.log")
+
+
+def apply_limits(page: Any, **limits: float) -> None:
+    """Ask for limits by their keys in a preset."""
+    for key, value in limits.items():
+        page.fill(f"#{key}", str(value))
+    page.get_by_role("button", name="Apply limits").click()
 
 
 def draw_charge(page: Any, path: Path) -> None:
@@ -125,6 +138,24 @@ def draw_fault(page: Any, path: Path) -> None:
     page.locator("#matrix").screenshot(path=path)
 
 
+def draw_limits(page: Any, path: Path) -> None:
+    """The controls, with limits tighter than the preset's."""
+    apply_limits(page, max_core_temperature_K=318, max_voltage_V=3.5)
+    page.get_by_role("button", name="Save preset.toml").wait_for()
+    page.locator("#limits").screenshot(path=path)
+
+
+def draw_pack_page(page: Any, path: Path) -> None:
+    """The page of a pack while one of its cells takes current away."""
+    page.select_option("#speed", label="100 times")
+    page.get_by_role("button", name="Charge anew").click()
+    page.locator("#governs", has_text="governs, by its core").wait_for()
+    page.focus('#heat button[data-governs="true"]')
+    page.select_option("#speed", label="real time")
+    page.wait_for_timeout(300)
+    page.screenshot(path=path)
+
+
 def main() -> None:
     """Draw the pictures of the documentation."""
     with dashboard() as (address, _), browser() as started:
@@ -133,6 +164,11 @@ def main() -> None:
         page.wait_for_selector("#rows li")
         draw_charge(page, PICTURES / "browser.png")
         draw_fault(page, PICTURES / "browser-fault.png")
+        draw_limits(page, PICTURES / "browser-limits.png")
+        page.goto(f"{address}pack.html")
+        page.set_viewport_size({"width": 1100, "height": 480})
+        page.wait_for_selector("#heat button")
+        draw_pack_page(page, PICTURES / "browser-pack.png")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
 """The page in Chromium: a charge, its log, faults, the keyboard, and a bus that is watched."""
 
+import base64
 import re
+import struct
 import subprocess
 import sys
 import time
@@ -8,18 +10,22 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from bms.presets import load_preset
 from hil_sim.bus.catalog import Mode
 from hil_sim.logs.recorder import Recorder
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import ControllerKind, Settings
 from tests.hil_sim.dashboard_page import (
     SIZE,
+    apply_limits,
     browser,
     dashboard,
     draw_charge,
     draw_fault,
+    draw_limits,
     inject,
     needs_browser,
+    saved,
     saved_log,
     set_speed,
     wait_for_end,
@@ -34,7 +40,8 @@ PNG = b"\x89PNG"
 FOCUSED = "document.activeElement.id || document.activeElement.textContent"
 CONTROLS = (
     "restart pause speed save beside mode reference cooling "
-    "preset soc temperature resistance capacity seed find as-matrix"
+    "max_voltage_V max_core_temperature_K max_surface_temperature_K max_soc completion_soc "
+    "apply-limits own-limits preset soc temperature resistance capacity seed find as-matrix"
 )
 NAMELESS = """[...document.querySelectorAll("input, select, button")]
   .filter((one) => !one.labels?.length && !one.getAttribute("aria-label"))
@@ -141,6 +148,64 @@ def test_s_cbf_beside_it_is_that_of_bms_sil_whenever_it_is_switched_on(page, pre
     page.locator("#decision", has_text=expected).wait_for()
 
 
+def test_a_tightened_limit_is_kept_in_the_frames_of_bms_sil_with_that_preset(
+    page, preset, tmp_path, bms
+):
+    set_speed(page, "as fast as it goes")
+    apply_limits(page, max_core_temperature_K=318, max_voltage_V=3.5)
+    wait_for_end(page, run=2)
+    assert "every one kept" in page.inner_text("#faults")
+    assert "318 K" in page.inner_text("#readings")
+    path = saved(page, tmp_path, "preset.toml")
+    tight = load_preset(path)
+    assert (tight.limits.max_core_temperature_K, tight.limits.max_voltage_V) == (318.0, 3.5)
+    log = saved_log(page, tmp_path)
+    assert log.read_bytes() == logged(tight, tmp_path / "sil.log", mode=Mode.FASTEST)
+    summary = run_both(Settings(tight, bus="virtual:page", mode=Mode.FASTEST)).summary
+    before = run_both(Settings(preset, bus="virtual:page", mode=Mode.FASTEST)).summary
+    assert summary.max_core_temperature_K <= 318.0 < before.max_core_temperature_K
+    assert summary.max_voltage_V <= 3.5 < before.max_voltage_V
+    assert bms("replay", log)[0] == 2  # the ECU names a preset that does not ship
+    for command in (("replay", log, "--preset", path), ("verify", "--preset", path)):
+        code, out, err = bms(*command)
+        assert code == 0, out + err
+
+
+def test_a_limit_that_is_refused_leaves_the_one_in_force(page):
+    set_speed(page, "as fast as it goes")
+    wait_for_end(page)
+    apply_limits(page, max_core_temperature_K=324)
+    message = page.locator("#message")
+    message.get_by_text("324 is looser than the preset's 323").wait_for()
+    apply_limits(page, max_core_temperature_K=320, completion_soc=0.98, max_soc=0.5)
+    message.get_by_text("completion_soc").wait_for()
+    assert page.get_attribute("body", "data-run") == "1"
+    assert "323 K" in page.inner_text("#readings")
+    assert page.locator("#save-preset").is_hidden()
+
+
+def test_a_calibration_that_the_firmware_refuses_leaves_the_one_in_force(page, preset, tmp_path):
+    def spoil(route):
+        answer = route.fetch()
+        made = answer.json()
+        block = bytearray(base64.b64decode(made["preset"]["scenario"]))
+        at = block.index(struct.pack("<f", 3.45))  # the limit of the voltage, in float32
+        block[at : at + 4] = struct.pack("<f", float("nan"))
+        made["preset"]["scenario"] = base64.b64encode(block).decode()
+        route.fulfill(response=answer, json=made)
+
+    set_speed(page, "as fast as it goes")
+    wait_for_end(page)
+    page.route("**/limits/*", spoil)
+    apply_limits(page, max_voltage_V=3.45)
+    page.locator("#message", has_text="the firmware refuses this calibration").wait_for()
+    assert page.get_attribute("body", "data-run") == "1"
+    page.get_by_role("button", name="Charge anew").click()
+    wait_for_end(page, run=2)
+    expected = logged(preset, tmp_path / "sil.log", mode=Mode.FASTEST)
+    assert saved_log(page, tmp_path).read_bytes() == expected
+
+
 @pytest.mark.parametrize(
     "name", ["lost for good", "sensor wire broken", "charger supplies more than commanded"]
 )
@@ -165,7 +230,7 @@ def test_everything_is_within_the_window_and_within_reach_of_the_keyboard(page):
         assert page.evaluate("document.documentElement.scrollWidth") == width
     page.evaluate("document.activeElement.blur()")
     reached = set()
-    for _ in range(40):
+    for _ in range(50):
         page.keyboard.press("Tab")
         reached.add(page.evaluate(FOCUSED))
     assert set(CONTROLS.split()) <= reached
@@ -183,8 +248,10 @@ def test_everything_is_within_the_window_and_within_reach_of_the_keyboard(page):
 def test_the_pictures_of_the_documentation_can_be_drawn(page, tmp_path):
     draw_charge(page, tmp_path / "charge.png")
     draw_fault(page, tmp_path / "fault.png")
+    draw_limits(page, tmp_path / "limits.png")
     assert (tmp_path / "charge.png").read_bytes().startswith(PNG)
     assert (tmp_path / "fault.png").read_bytes().startswith(PNG)
+    assert (tmp_path / "limits.png").read_bytes().startswith(PNG)
     assert "S-CBF" in page.inner_text("#charts")
 
 
@@ -223,8 +290,39 @@ def test_a_bus_with_bms_plant_and_bms_ecu_is_shown_until_it_is_lost(chromium):
                 other.wait()
         page.get_by_text("the bus has been silent").wait_for()
         assert not [command for command in told if command[:1] in FRAMES]
+        points = int(page.get_attribute("#charts", "data-points"))
         hub.drop()
-        page.locator("#message", has_text=hub.bus).wait_for()
-        assert page.inner_text("#state") == "no feed"
+        page.locator("#message", has_text=f"{hub.bus}").get_by_text("connecting again").wait_for()
+        page.get_by_text("the bus has been silent").wait_for()
+        hub.send(b"T000001001AB")
+        page.get_by_text("2 of them foreign").wait_for()
+        assert int(page.get_attribute("#charts", "data-points")) > points
         assert process.poll() is None
         page.close()
+
+
+def test_a_server_that_was_lost_is_found_again_and_the_plots_go_on(chromium):
+    with SlcanHub() as hub:
+        with dashboard("--bus", hub.bus) as (address, _):
+            page = chromium.new_page(viewport=SIZE)
+            page.goto(address)
+            page.get_by_text("waiting for frames").wait_for()
+            hub.send(b"T000001001AB")
+            page.get_by_text("1 of them foreign").wait_for()
+            page.wait_for_timeout(2000)
+        lost = page.locator("#message", has_text="the server of the page is not there")
+        waits = []
+        for wait in ("1 s", "2 s", "4 s"):
+            lost.get_by_text(f"connecting again in {wait}").wait_for()
+            waits.append(time.monotonic())
+        assert page.inner_text("#state") == "no feed"
+        page_points = int(page.get_attribute("#charts", "data-points"))
+        assert page_points > 5
+        with dashboard("--bus", hub.bus, "--port", urlsplit(address).port):
+            page.get_by_text("waiting for frames").wait_for()
+            hub.send(b"T000001001AB")
+            page.get_by_text("1 of them foreign").wait_for()
+            assert int(page.get_attribute("#charts", "data-points")) > page_points
+            assert page.inner_text("#state") != "no feed"
+            page.close()
+    assert waits[2] - waits[1] > 1.5 > waits[1] - waits[0] > 0.5

@@ -6,17 +6,19 @@ import re
 import socket
 import threading
 import time
+from dataclasses import replace
 from urllib.parse import urlsplit
 
 import pytest
 
 from bms.errors import BusError, InputError
 from bms.model.model_file import shipped_model_path
+from bms.presets import load_preset
 from hil_sim.bus.buses import Frame
 from hil_sim.bus.foreign import ForeignFrame
 from hil_sim.dashboard import build as page_build
 from hil_sim.dashboard.feed import BusFeed
-from hil_sim.dashboard.page_data import config_data
+from hil_sim.dashboard.page_data import config_data, preset_data
 from hil_sim.dashboard.site import write_site
 from hil_sim.dashboard.ziggurat import ziggurat_tables
 from hil_sim.monitor.presets import preset_finder
@@ -83,8 +85,45 @@ def test_another_name_for_this_machine_is_refused(address):
 
 @needs_page
 def test_nothing_outside_of_the_page_is_handed_out(address):
-    for path in ("/../server.py", "/%2e%2e/server.py", "/data/../../x.json", "/data/nothing.json"):
+    for path in (
+        "/../server.py",
+        "/%2e%2e/server.py",
+        "/data/../../x.json",
+        "/data/nothing.json",
+        "/limits/x.json",
+    ):
         assert get(address, path)[0] == 404
+    assert get(address, "/limits/nothing.json")[0] == 404
+
+
+@needs_page
+def test_limits_may_be_lowered_and_what_follows_from_them_is_made_anew(address, tmp_path):
+    status, _, content = get(address, "/limits/lin2014.json?max_voltage_V=3.5")
+    made = json.loads(content)
+    (tmp_path / "preset.toml").write_text(made["file"])
+    preset = load_preset(tmp_path / "preset.toml")
+    own = load_preset("lin2014")
+    assert preset == replace(own, limits=replace(own.limits, max_voltage_V=3.5))
+    assert status == 200
+    assert made["preset"] == json.loads(json.dumps(preset_data(str(tmp_path / "preset.toml"))))
+
+
+@needs_page
+@pytest.mark.parametrize(
+    ("query", "said"),
+    [
+        ("max_voltage_V=3.7", "limits.max_voltage_V: 3.7 is looser than the preset's 3.6"),
+        ("max_voltage_V=x", "limits.max_voltage_V: 'x' is no positive number; at most 3.6"),
+        ("max_soc=nan", "limits.max_soc: 'nan' is no positive number"),
+        ("completion_soc=-1", "limits.completion_soc: '-1' is no positive number"),
+        ("max_soc=0.5", "completion_soc"),
+        ("reference_current_A=-10", "limits.reference_current_A: cannot be changed here"),
+    ],
+)
+def test_limits_that_cannot_be_are_refused_in_one_line(address, query, said):
+    message = json.loads(get(address, f"/limits/lin2014.json?{query}")[2])["error"]
+    assert said in message
+    assert len(message.splitlines()) == 1
 
 
 @needs_page
@@ -167,6 +206,8 @@ def test_malformed_frames_are_counted_and_a_lost_bus_is_told(monkeypatch):
         assert refused == {"CellElectrical": 1, "Identity": 1}
         FailingListener.fails.set()
         wait_until(lambda: feed.message() == {"error": "bus 'x': the line is gone"})
+        FailingListener.fails.clear()
+        wait_until(lambda: feed.message().get("snapshot", {}).get("frames") == 8)
 
 
 @needs_page

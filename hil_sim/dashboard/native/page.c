@@ -56,6 +56,11 @@ uint32_t frame_size(void)
     return (uint32_t)sizeof frames[0];
 }
 
+uint32_t is_accepted(void)
+{
+    return calibration_is_valid(&scenario.calibration) ? 1u : 0u;
+}
+
 void begin(void)
 {
     session_begin(&session, &scenario, &settings);

@@ -38,6 +38,9 @@ PAGE(values_address) void *values_address(void);
 PAGE(frames_address) void *frames_address(void);
 PAGE(frame_size) uint32_t frame_size(void);
 
+/* Whether the firmware takes the calibration of the scenario. */
+PAGE(is_accepted) uint32_t is_accepted(void);
+
 /* The parts of a period, as in session.h. */
 PAGE(begin) void begin(void);
 PAGE(start_ecu) void start_ecu(void);

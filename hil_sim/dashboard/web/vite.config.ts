@@ -6,6 +6,7 @@ export default defineConfig({
   worker: { format: "es" },
   build: {
     target: "es2023",
+    rollupOptions: { input: ["index.html", "pack.html"] },
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
     license: { fileName: "licenses.md" }, // of what is bundled

@@ -136,6 +136,7 @@ export class Charts {
       setTimeout(() => {
         this.isDue = false;
         this.plots.forEach(({ plot, chart }) => plot.setData(this.data(chart)));
+        byId("charts").dataset["points"] = String(this.columns.get("time_s")!.length);
       }, REDRAW_MS);
     }
   }

@@ -78,6 +78,28 @@ export interface Row {
 export interface Config {
   bus: string | null; // that is shown live
   presets: string[]; // the first is the one to begin with
+  packs: string; // the preset that there are packs of
+  makes_limits: boolean; // there is a server that makes the calibration of tighter limits
+}
+
+/** A preset whose limits were lowered, and its file. */
+export interface Tightened {
+  preset: PresetData;
+  rows: Row[];
+  file: string;
+}
+
+/** Limits by their keys in a preset; the server's reason in an Error where it refuses them. */
+export async function fetchTightened(name: string, limits: Record<string, string>): Promise<Tightened> {
+  const response = await fetch(`limits/${name}.json?${new URLSearchParams(limits)}`);
+  if (!response.ok) {
+    throw new Error(`the server answers ${response.status} when asked for limits; reload the page`);
+  }
+  const made = (await response.json()) as Tightened | { error: string };
+  if ("error" in made) {
+    throw new Error(made.error);
+  }
+  return made;
 }
 
 export async function fetchData<T>(path: string): Promise<T> {

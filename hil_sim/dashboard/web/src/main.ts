@@ -5,7 +5,8 @@ import { Codecs } from "./codec";
 import { Controls } from "./controls";
 import { fetchData, type Config, type Database, type Limits, type PresetData, type Row } from "./data";
 import { byId, setText } from "./dom";
-import { listen } from "./feed";
+import { listen, LiveClock } from "./feed";
+import { LimitControls } from "./limits";
 import { Matrix } from "./matrix";
 import type { FromWorker, ToWorker } from "./messages";
 import { duration, ReadingCards, showDecision, showFaults, showTraffic } from "./panels";
@@ -51,10 +52,10 @@ class View {
   }
 }
 
-function save(lines: readonly string[]): void {
+function save(lines: readonly string[], name: string): void {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob(lines as string[], { type: "text/plain" }));
-  link.download = "can.log";
+  link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
@@ -79,13 +80,13 @@ async function simulate(config: Config, database: Database): Promise<void> {
     post({ type: "run", isRunning: true });
   };
   const load = async (chosen: PresetData) => {
-    view.setLimits(chosen.limits);
     controls.setPreset(chosen);
-    setText(byId("source"), `${chosen.name}, simulated in this page`);
+    limits.setPreset(chosen);
     post({ type: "load", module, database, preset: chosen });
     begin();
     matrix.setRows(await fetchData<Row[]>(`data/${chosen.name}.rows.json`));
   };
+  const loadAgain = (chosen: PresetData) => post({ type: "load", module, database, preset: chosen });
   const guarded = (work: Promise<void>) => {
     work.catch((error: unknown) => tell(String(error)));
   };
@@ -100,6 +101,16 @@ async function simulate(config: Config, database: Database): Promise<void> {
     },
     preset: (name) => guarded(fetchData<PresetData>(`data/${name}.json`).then(load)),
     save: () => post({ type: "log" }),
+  });
+  let rowsOf: { preset: PresetData; rows: Row[] } | null = null; // that the firmware is asked to take
+  const limits = new LimitControls(config.makes_limits, {
+    apply: ({ preset: chosen, rows }) => {
+      rowsOf = { preset: chosen, rows };
+      loadAgain(chosen);
+    },
+    reset: (name) => guarded(fetchData<PresetData>(`data/${name}.json`).then(load)),
+    save: (file) => save([file], "preset.toml"),
+    refused: (message) => tell(`${message}; the limits before stay in force`),
   });
   const matrix = new Matrix((row, isFromItsStart) => {
     if (!isFromItsStart) {
@@ -125,10 +136,21 @@ async function simulate(config: Config, database: Database): Promise<void> {
         document.body.dataset["end"] = data.snapshot.end ?? "";
         setText(byId("footer"), data.snapshot.end === null ? "" : `The run is over: ${data.snapshot.end}.`);
         break;
+      case "loaded":
+        view.setLimits(data.preset.limits);
+        setText(byId("source"), `${data.preset.name}, simulated in this page`);
+        limits.loaded(data.preset);
+        if (rowsOf?.preset.preset_hash === data.preset.preset_hash) {
+          matrix.setRows(rowsOf.rows);
+          begin();
+        }
+        rowsOf = null;
+        break;
       case "log":
-        save(data.lines);
+        save(data.lines, "can.log");
         break;
       case "error":
+        rowsOf = null;
         tell(data.message);
         break;
     }
@@ -141,28 +163,36 @@ async function simulate(config: Config, database: Database): Promise<void> {
 function watchBus(bus: string, database: Database): void {
   const view = new View(new Codecs(database), false, null);
   setText(byId("source"), `${bus}, listened to only`);
+  const row = (...known: number[]) =>
+    view.charts.add(Float64Array.from([...known, ...HISTORY.slice(known.length).map(() => NaN)]));
+  const clock = new LiveClock();
   listen({
     snapshot: (snapshot, limits, remark) => {
+      const { time_s, gap_s } = clock.read(snapshot.time_s);
       tell(remark);
-      view.setLimits(limits);
+      if (limits !== null) {
+        view.setLimits(limits); // those of before stay while the ECU has not told who it is
+      }
       view.show(snapshot);
+      if (gap_s !== null) {
+        row(gap_s);
+      }
       const value = (name: string) => snapshot.readings[name] ?? NaN;
-      const row = [
-        snapshot.time_s,
+      row(
+        time_s,
         value("Current"),
         value("CommandCurrent"),
         value("Voltage"),
         value("StateOfCharge"),
         value("SurfaceTemperature"),
         value("CoreTemperature"),
-      ];
-      const unknown = HISTORY.slice(row.length).map(() => NaN);
-      view.charts.add(Float64Array.from([...row, ...unknown]));
+      );
     },
-    ended: (message) => {
+    lost: (message, wait_s) => {
+      clock.lose();
       setText(byId("state"), "no feed");
       byId("state").dataset["state"] = "lost";
-      tell(message);
+      tell(`${message}; connecting again in ${wait_s} s`);
     },
   });
 }

@@ -16,5 +16,6 @@ export type ToWorker =
 
 export type FromWorker =
   | { type: "snapshot"; run: number; snapshot: Snapshot; samples: Float64Array }
+  | { type: "loaded"; preset: PresetData }
   | { type: "log"; lines: string[] }
   | { type: "error"; message: string };

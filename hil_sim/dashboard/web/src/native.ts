@@ -32,6 +32,7 @@ interface Exports extends WebAssembly.Exports {
   values_address(): number;
   frames_address(): number;
   frame_size(): number;
+  is_accepted(): number;
   begin(): void;
   start_ecu(): void;
   measure(): void;
@@ -72,6 +73,9 @@ export class Native {
       throw new Error("the preset was made for another build of the module; reload the page");
     }
     this.bytes.set(scenario, this.exports.scenario_address());
+    if (this.exports.is_accepted() === 0) {
+      throw new Error("the firmware refuses this calibration; the one before stays in force");
+    }
   }
 
   begin(start: Start): void {

@@ -75,6 +75,7 @@ function take(message: ToWorker): void {
     case "load":
       engine = new Engine(message.module, message.database, message.preset);
       session = null;
+      post({ type: "loaded", preset: message.preset });
       break;
     case "begin":
       session = engine!.begin(message.start, message.request);
