@@ -40,9 +40,11 @@ _FOR_A_HOST_ONLY = ("socketcan_batch.c",)
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-s")
 _TARGET = ("-target", "wasm32-wasi", "-mexec-model=reactor")
 
-
 _PACK_FOLDERS = (*CORE_FOLDERS, "firmware_c/pack", _CELL, _PACK, NATIVE, _PACK_PAGE)
-_ONE_CELL_ONLY = ("page.c", "page.h", "session.c", "session.h")
+_NOT_FOR_THE_PACK = tuple(
+    f"{name}.{kind}" for name in ("page", "session", "pack_wire") for kind in "ch"
+)
+"""Of one cell, and of the bus, which the page has none of for a pack."""
 
 
 def sources(root: Path = ROOT) -> list[Path]:
@@ -66,7 +68,7 @@ def compile_module(path: Path, root: Path = ROOT) -> None:
 
 def compile_pack_module(path: Path, root: Path = ROOT) -> None:
     """Write the module of a pack to a path; InputError as below."""
-    _compile(path, root, _PACK_FOLDERS, _sources(root, _PACK_FOLDERS, _ONE_CELL_ONLY))
+    _compile(path, root, _PACK_FOLDERS, _sources(root, _PACK_FOLDERS, _NOT_FOR_THE_PACK))
 
 
 def _compile(path: Path, root: Path, folders: tuple[str, ...], files: list[Path]) -> None:
