@@ -76,8 +76,8 @@ MUTANTS = {
     "fixed part of the model": ("(header->length < UP_TO_TABLES)", "(header->length < 16u)"),
     "firmware version": ("if (header->firmware_version != application->firmware_version)", "if (false)"),
     "model": ("(calibration->model_hash == header->model_hash) &&", ""),
-    "preset": ("&&\n            (calibration->preset_hash == header->preset_hash)", ""),
-    "block layout": ("if (calibration->layout != header->calibration_layout)", "if (false)"),
+    "preset": ("&&\n        (calibration->preset_hash == header->preset_hash)", ""),
+    "block layout": ("has_layout && !is_short &&", "!is_short &&"),
 }  # fmt: skip
 
 
