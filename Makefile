@@ -95,7 +95,12 @@ verify-tables: build/extensions ## Try all 2^32 arguments of every edge of the s
 long-checks: .venv/tests build/extensions ## What takes too long for make test (see results/checks.toml) where its inputs have changed; CHECKS=name alone
 	$(BIN)/python tools/long_checks.py $(CHECKS)
 
-fuzz: fuzz-frames fuzz-logs ## 10^7 damaged frames through the ECU with sanitizers, 10^6 damaged logs through the readers; SEED=n for others
+ifdef TARGET
+fuzz: .venv/tests .venv/gates build/extensions ## 10^7 damaged frames, 10^6 damaged logs (SEED=n for others); or libFuzzer: TARGET=session|clock|slcan|image|calibration SECONDS=60
+	$(BIN)/python -m tests.firmware.fuzz.run $(TARGET) $(or $(SECONDS),60) $(or $(SEED),1)
+else
+fuzz: fuzz-frames fuzz-logs
+endif
 
 fuzz-frames: .venv/tests build/extensions
 	$(BIN)/python -m tests.firmware.native.build fuzz --sanitize --out build/native

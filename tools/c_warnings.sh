@@ -11,6 +11,9 @@ for source in firmware_c/src/*.c firmware_c/generated/*.c firmware_c/image/*.c f
   firmware_c/host/*.c firmware_c/pack/*.c firmware_c/pack/generated/*.c firmware_c/pack_ecu/*.c "$native"/*.c "$runner"/*.c "$pack"/*.c "$rivals"/*.c "$page"/*.c "$programs"/*.c; do
   ${CC:-cc} $flags $includes -I"$native" -I"$runner" -I"$pack" -I"$rivals" -I"$page" -I"$programs" "$source"
 done
+for source in tests/firmware/fuzz/*.c; do
+  ${CC:-cc} $flags $includes -I"$programs" -Itests/firmware/fuzz "$source"
+done
 for source in firmware_c/port/linux/*.c hil_sim/bus/*.c; do # the operating system's own interface is beyond C99
   ${CC:-cc} $flags -D_DEFAULT_SOURCE $includes "$source"
 done

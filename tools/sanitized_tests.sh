@@ -8,6 +8,6 @@ runtime=$(${CC:-gcc} -print-file-name=libasan.so)
 LD_PRELOAD=$runtime ASAN_OPTIONS=detect_leaks=0:detect_odr_violation=0 UBSAN_OPTIONS=print_stacktrace=1 BMS_SANITIZE=1 \
   .venv/bin/python -m pytest tests/firmware -n 2 --dist loadfile --firmware-build build/sanitized \
   --ignore tests/firmware/test_mutants.py --ignore tests/firmware/test_structure.py \
-  --ignore tests/firmware/test_fuzz.py --ignore tests/firmware/test_boot.py \
+  --ignore tests/firmware/test_fuzz.py --ignore tests/firmware/test_fuzz_targets.py --ignore tests/firmware/test_boot.py \
   --ignore tests/firmware/test_budgets.py --ignore tests/firmware/test_ports.py \
   --ignore tests/firmware/test_linux_port.py "$@"

@@ -1,0 +1,1 @@
+"""libFuzzer targets for the C core, each with an oracle, and their corpora."""
