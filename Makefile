@@ -48,7 +48,7 @@ ifdef TESTS
 test: .venv/tests build/extensions ## Everything that must pass: real vcan, images in QEMU, sanitizers; or TESTS=path alone
 	$(PYTEST) --dist loadfile $(TESTS)
 else
-test: .venv/tests build/extensions build/sanitized/done lint
+test: .venv/tests .venv/gates build/extensions build/sanitized/done lint
 	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory page; \
 	  else echo "not run: the page in a browser; it needs Node.js with npm" >&2; test -z "$$CI"; fi
 	@if command -v arm-none-eabi-gcc >/dev/null && command -v qemu-system-arm >/dev/null; then \
