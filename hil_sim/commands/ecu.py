@@ -12,12 +12,12 @@ from bms.firmware import Ecu
 from bms.presets import DEFAULT_PRESET
 from hil_sim.bus.buses import open_bus, require_shared
 from hil_sim.bus.foreign import counts_text
-from hil_sim.commands import options, pack_charge
+from hil_sim.commands import options, pack_options
 from hil_sim.commands.stopping import stop_event
 from hil_sim.nodes.clock import WallClock
 from hil_sim.nodes.ecu import EcuNode
 from hil_sim.nodes.punctuality import Slots, TimeStatistics
-from hil_sim.pack.settings import SpreadKind
+from hil_sim.pack.spread_kind import SpreadKind
 
 
 def ecu(
@@ -32,9 +32,9 @@ def ecu(
         float,
         typer.Option("--silence-s", min=0.1, help="End after this time in s without a frame."),
     ] = 5.0,
-    cells: pack_charge.CellsOption = None,
-    spread: pack_charge.SpreadOption = SpreadKind.PUBLISHED,
-    per_thermistor: pack_charge.PerThermistorOption = 1,
+    cells: pack_options.CellsOption = None,
+    spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
+    per_thermistor: pack_options.PerThermistorOption = 1,
 ) -> int:
     """Run the firmware on a CAN bus until the bus falls silent, or until Ctrl-C or SIGTERM.
 
@@ -44,10 +44,12 @@ def ecu(
     Example: bms ecu --bus socketcan:vcan0 --silence-s 10
     """
     if cells is not None:
-        pack_charge.refuse_options({"--realtime": realtime})
+        from hil_sim.commands import pack_charge  # noqa: PLC0415 (plots and solvers)
+
+        pack_options.refuse_options({"--realtime": realtime})
         chosen = pack_charge.pack_settings(preset, model, cells, bus, spread, per_thermistor)
         return pack_charge.ecu_pack(chosen, silence_s)
-    pack_charge.refuse_pack_options(spread, per_thermistor)
+    pack_options.refuse_pack_options(spread, per_thermistor)
     require_shared(bus)
     firmware = Ecu(preset=preset, model=model)
     stop = stop_event()

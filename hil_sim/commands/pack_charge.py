@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Any, Protocol
+from typing import Any, Protocol
 
-import typer
 from rich.console import Console
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
-from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.text_table import TextTable
 from bms.waiting import waiting
@@ -25,21 +22,10 @@ from hil_sim.nodes.ecu import EcuNode
 from hil_sim.pack.charge import PackResult, charge_pack, charge_pack_elsewhere
 from hil_sim.pack.ecu import PackEcu
 from hil_sim.pack.report import write_pack_report
-from hil_sim.pack.settings import PackChargeSettings, SpreadKind
+from hil_sim.pack.settings import PackChargeSettings
+from hil_sim.pack.spread_kind import SpreadKind
 from hil_sim.pack.summary import has_passed, summary
 from hil_sim.report.folder import OutputFolder
-
-CellsOption = Annotated[
-    int | None,
-    typer.Option("--cells", min=1, help="A pack of so many cells in series. Default: one cell."),
-]
-SpreadOption = Annotated[
-    SpreadKind, typer.Option("--spread", help="How the cells of a pack differ; with --cells.")
-]
-PerThermistorOption = Annotated[
-    int,
-    typer.Option("--per-thermistor", min=1, help="Cells for each thermistor; with --cells."),
-]
 
 
 class Charge(Protocol):
@@ -50,19 +36,6 @@ class Charge(Protocol):
     ) -> PackResult:
         """Charge to the end; `progress` is told the greatest state of charge."""
         ...
-
-
-def refuse_options(given: Mapping[str, bool]) -> None:
-    """Raise InputError for the first option that is given and means one cell only."""
-    for option, is_given in given.items():
-        if is_given:
-            raise InputError(f"{option}: is for one cell; leave it out, or --cells")
-
-
-def refuse_pack_options(spread: SpreadKind, per_thermistor: int) -> None:
-    """Raise InputError for an option that means a pack, without --cells."""
-    if spread is not SpreadKind.PUBLISHED or per_thermistor != 1:
-        raise InputError("--spread, --per-thermistor: are for a pack; add --cells")
 
 
 def pack_settings(

@@ -10,9 +10,9 @@ import typer
 from bms.commands.options import JsonOption, ModelOption, PresetOption
 from bms.errors import InputError
 from bms.presets import DEFAULT_PRESET, load_preset
-from hil_sim.commands import charge_mode, options, pack_charge
+from hil_sim.commands import charge_mode, options, pack_options
 from hil_sim.commands.outcome import charge_and_report, charge_settings
-from hil_sim.pack.settings import SpreadKind
+from hil_sim.pack.spread_kind import SpreadKind
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.session import run_plant
 from hil_sim.run.settings import Settings
@@ -38,9 +38,9 @@ def plant(
     ] = 1.0,
     mode: charge_mode.ModeOption = None,
     full_by_s: charge_mode.FullByOption = None,
-    cells: pack_charge.CellsOption = None,
-    spread: pack_charge.SpreadOption = SpreadKind.PUBLISHED,
-    per_thermistor: pack_charge.PerThermistorOption = 1,
+    cells: pack_options.CellsOption = None,
+    spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
+    per_thermistor: pack_options.PerThermistorOption = 1,
     model: ModelOption = None,
 ) -> int:
     """Charge a simulated cell with whatever ECU is on the bus, for example `bms ecu`.
@@ -54,7 +54,9 @@ def plant(
     Example: bms plant --bus socketcan:vcan0 --seed 1 --out out/run
     """
     if cells is not None:
-        pack_charge.refuse_options(
+        from hil_sim.commands import pack_charge  # noqa: PLC0415 (plots and solvers)
+
+        pack_options.refuse_options(
             {
                 "--plant": cell != Settings.plant,
                 "--disturbance": disturbance is not DisturbanceKind.NONE,
@@ -68,7 +70,7 @@ def plant(
             preset, model, cells, bus, spread, per_thermistor, seed, max_time_s, answer_timeout_s
         )
         return pack_charge.plant_pack(chosen, out, as_json, log)
-    pack_charge.refuse_pack_options(spread, per_thermistor)
+    pack_options.refuse_pack_options(spread, per_thermistor)
     if model is not None:
         raise InputError(f"--model {model}: is what a pack's ECU has to have; add --cells")
     settings = charge_settings(

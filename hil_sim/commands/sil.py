@@ -13,10 +13,10 @@ from bms.errors import InputError
 from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.bus.buses import is_serial_line
-from hil_sim.commands import charge_mode, options, pack_charge
+from hil_sim.commands import charge_mode, options, pack_options
 from hil_sim.commands.baselines import BaselineOption, baseline_settings
 from hil_sim.commands.outcome import charge_and_report, charge_settings
-from hil_sim.pack.settings import SpreadKind
+from hil_sim.pack.spread_kind import SpreadKind
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.session import run_sil
 from hil_sim.run.settings import ControllerKind, Settings
@@ -51,9 +51,9 @@ def sil(
     max_time_s: options.MaxTimeOption = 3600.0,
     mode: charge_mode.ModeOption = None,
     full_by_s: charge_mode.FullByOption = None,
-    cells: pack_charge.CellsOption = None,
-    spread: pack_charge.SpreadOption = SpreadKind.PUBLISHED,
-    per_thermistor: pack_charge.PerThermistorOption = 1,
+    cells: pack_options.CellsOption = None,
+    spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
+    per_thermistor: pack_options.PerThermistorOption = 1,
 ) -> int:
     """Charge a simulated cell over a CAN bus with the ECU in the same process.
 
@@ -68,7 +68,9 @@ def sil(
     Example: bms sil --mode fastest --baseline s-cbf --baseline kan-rcbf-fixed --out out/run
     """
     if cells is not None:
-        pack_charge.refuse_options(
+        from hil_sim.commands import pack_charge  # noqa: PLC0415 (plots and solvers)
+
+        pack_options.refuse_options(
             {
                 "--controller": controller is not ControllerKind.KAN_RCBF,
                 "--baseline": bool(baseline),
@@ -85,7 +87,7 @@ def sil(
             preset, model, cells, bus, spread, per_thermistor, seed, max_time_s
         )
         return pack_charge.sil_pack(chosen, out, as_json, log)
-    pack_charge.refuse_pack_options(spread, per_thermistor)
+    pack_options.refuse_pack_options(spread, per_thermistor)
     with ExitStack() as stack:
         if target is not None:
             if bus != Settings.bus:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hil_sim.bus.frame import Frame
 from hil_sim.pack.frames import FRAME, packed, unpacked
-from hil_sim.pack.settings import PackChargeSettings
+from hil_sim.pack.settings import PackChargeSettings, spread_of
 from hil_sim.plant.charger import Charger
 from hil_sim.studies.pack._pack import ffi, lib
 from hil_sim.studies.pack.engine import BLOCK_PERIODS, SUB_STEPS, PackCharge
@@ -30,7 +30,9 @@ class PackPlant:
         draws, self._noise, _, string = (
             np.random.Generator(np.random.Philox(child)) for child in children
         )
-        drawn = draw_pack(preset, settings.spread.spread, settings.cells, draws, settings.disturbed)
+        drawn = draw_pack(
+            preset, spread_of(settings.spread), settings.cells, draws, settings.disturbed
+        )
         self._settings = settings
         self._charge = PackCharge(
             settings.core(), drawn, settings.around, settings.view, settings.max_time_s

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import Enum
 from functools import lru_cache
 
 from bms.bus_signals import BUS
@@ -11,6 +10,7 @@ from bms.errors import InputError
 from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.presets.schema import Sensor
+from hil_sim.pack.spread_kind import SpreadKind
 from hil_sim.studies.pack._pack import lib
 from hil_sim.studies.pack.engine import Core, View, all_cells
 from hil_sim.studies.pack.reserves import reserves
@@ -20,16 +20,9 @@ _EQUAL = (1.0, 1.0)
 NO_SPREAD = Spread(_EQUAL, _EQUAL, _EQUAL, _EQUAL, _EQUAL, start_soc=0.0)
 
 
-class SpreadKind(str, Enum):
-    """How the cells of a pack differ."""
-
-    PUBLISHED = "published"
-    NONE = "none"
-
-    @property
-    def spread(self) -> Spread:
-        """Intervals of the factors on a cell's parameters."""
-        return Spread() if self is SpreadKind.PUBLISHED else NO_SPREAD
+def spread_of(kind: SpreadKind) -> Spread:
+    """Intervals of the factors on a cell's parameters."""
+    return Spread() if kind is SpreadKind.PUBLISHED else NO_SPREAD
 
 
 @dataclass(frozen=True)
@@ -69,7 +62,7 @@ class PackChargeSettings:
 
         Raises InputError as `reserves` and ModelMismatchError as calibration_fields does.
         """
-        kept = _reserves(self.preset, self.spread.spread, self.around)
+        kept = _reserves(self.preset, spread_of(self.spread), self.around)
         return Core(self.preset, self.model, kept)
 
     @property

@@ -350,7 +350,9 @@ def test_json_holds_what_was_not_identified(bms, tmp_path):
 def test_measured_drive_cycle_gives_a_preset(bms, tmp_path):
     code, _, err = bms("identify", "--data", MEASURED, "--out", tmp_path / "mine.toml")
 
-    assert (code, err) == (0, "")
+    # On a busy machine it takes long enough to say how far it is.
+    told = [line for line in err.splitlines() if not line.startswith("bms: fitting from several")]
+    assert (code, told) == (0, [])
     assert load_preset(tmp_path / "mine.toml").cell.ohmic_resistance_ohm > 0.008
 
 

@@ -14,7 +14,8 @@ from codegen.can_database import PACK, data_ids, load_database
 from hil_sim.logs import read_log
 from hil_sim.logs.recorder import Recorder
 from hil_sim.pack.charge import OFF_PERIODS, charge_pack
-from hil_sim.pack.settings import PACK_VOLTAGE_STEP_V, PackChargeSettings, SpreadKind
+from hil_sim.pack.settings import PACK_VOLTAGE_STEP_V, PackChargeSettings, spread_of
+from hil_sim.pack.spread_kind import SpreadKind
 from hil_sim.studies.pack._pack import ffi, lib
 from hil_sim.studies.pack.engine import BLOCK_PERIODS, PackCharge
 from hil_sim.studies.pack.spread import draw_pack
@@ -178,7 +179,7 @@ def test_the_charge_over_the_bus_is_that_of_the_study_s_engine_within_the_frames
     over_bus = charge_pack(settings)
     children = np.random.SeedSequence(entropy=0, spawn_key=(0,)).spawn(3)
     draws, noise, _ = (np.random.Generator(np.random.Philox(child)) for child in children)
-    drawn = draw_pack(PRESET, settings.spread.spread, 16, draws)
+    drawn = draw_pack(PRESET, spread_of(settings.spread), 16, draws)
     engine = PackCharge(settings.core(), drawn, settings.around, settings.view, 3600.0)
     engine.fields.off_periods = OFF_PERIODS + 1
     width = 2 * 16 + lib.PACK_SHARED_NORMALS

@@ -1,0 +1,39 @@
+"""The options of `bms sil`, `bms plant` and `bms ecu` that mean a pack in place of one cell.
+
+What runs a pack is loaded only for one: a single cell's ECU starts without plots and solvers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+import typer
+
+from bms.errors import InputError
+from hil_sim.pack.spread_kind import SpreadKind
+
+CellsOption = Annotated[
+    int | None,
+    typer.Option("--cells", min=1, help="A pack of so many cells in series. Default: one cell."),
+]
+SpreadOption = Annotated[
+    SpreadKind, typer.Option("--spread", help="How the cells of a pack differ; with --cells.")
+]
+PerThermistorOption = Annotated[
+    int,
+    typer.Option("--per-thermistor", min=1, help="Cells for each thermistor; with --cells."),
+]
+
+
+def refuse_options(given: Mapping[str, bool]) -> None:
+    """Raise InputError for the first option that is given and means one cell only."""
+    for option, is_given in given.items():
+        if is_given:
+            raise InputError(f"{option}: is for one cell; leave it out, or --cells")
+
+
+def refuse_pack_options(spread: SpreadKind, per_thermistor: int) -> None:
+    """Raise InputError for an option that means a pack, without --cells."""
+    if spread is not SpreadKind.PUBLISHED or per_thermistor != 1:
+        raise InputError("--spread, --per-thermistor: are for a pack; add --cells")
