@@ -25,7 +25,7 @@ QUICK_TESTS ?= $(foreach test, calibration_choice charge_mode codec codec_messag
   tests/codegen/test_generated.py $(foreach test, barrier_constants model_file presets, tests/bms/test_$(test).py) \
   $(foreach test, database plant_node replay_golden, tests/hil_sim/test_$(test).py)
 
-.PHONY: help build run page dashboard quick test lint coverage misra mutants proofs generate models verify-tables long-checks fuzz fuzz-frames fuzz-logs benchmark docs clean
+.PHONY: help build run page dashboard quick test lint coverage misra mutants proofs evidence generate models verify-tables long-checks fuzz fuzz-frames fuzz-logs benchmark docs clean
 .DEFAULT_GOAL := help
 
 help: ## List the targets
@@ -76,6 +76,10 @@ misra: .venv/tests .venv/gates ## MISRA C:2012 over the C core by cppcheck, agai
 
 mutants: .venv/tests build/extensions ## Mutants of the C sources that have changed since build/mutants.json, on the tests of each
 	$(BIN)/python -m tests.firmware.mutants.run > build/mutants.log
+
+evidence: .venv/tests .venv/gates build/extensions ## Records of all gates that are quick anew where stale, then one report of all: out/evidence
+	$(BIN)/python -m tools.gates.records
+	$(BIN)/bms evidence --out out/evidence
 
 proofs: .venv/tests ## What CBMC proves of the C core, for all inputs (tests/firmware/proofs)
 	$(BIN)/python tools/long_checks.py proofs

@@ -75,6 +75,7 @@ COMMANDS: dict[str, tuple[int, str]] = {
     "preset show": (0, "a123_26650"),
     "preset diff": (0, "lin2014 paper_calibrated"),
     "flash": (0, "--image IMAGE/firmware.bin --flash DIR/flash.bin --no-start"),
+    "evidence": (2, "--out DIR/run.csv"),
     "cost": (2, "--target qemu:mps2-an386 --out DIR/cost.png"),
     "compare-targets": (2, "--target qemu:mps2-an386 --rows lost --build DIR"),
 }

@@ -8,56 +8,41 @@ is no longer that of the files here. See results/checks.toml.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import re
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from hil_sim.evidence.kept import LONG_CHECKS, KeptCheck, load_kept
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = Path("results")
 
 
-@dataclass(frozen=True)
-class LongCheck:
-    """A command, and the files (patterns in the repository) on which its answer rests."""
-
-    name: str
-    command: tuple[str, ...]
-    inputs: tuple[str, ...]
+class LongCheck(KeptCheck):
+    """A check that can be run."""
 
     def inputs_sha256(self, root: Path = ROOT) -> str:
-        """Hash of names and content of all inputs; ValueError when a pattern finds none."""
-        paths: set[Path] = set()
-        for pattern in self.inputs:
-            found = {path for path in root.glob(pattern) if path.is_file()}
-            if not found:
-                raise ValueError(f"{FOLDER}/checks.toml: {self.name}: no file for '{pattern}'")
-            paths |= found
-        digest = hashlib.sha256("\0".join(self.command).encode())
-        for path in sorted(paths):
-            digest.update(f"\n{path.relative_to(root).as_posix()}\n".encode() + path.read_bytes())
-        return digest.hexdigest()
+        """As of any kept check, by default of this repository."""
+        return super().inputs_sha256(root)
 
     def result(self, root: Path = ROOT) -> dict[str, Any] | None:
-        """The kept result; None without one."""
-        path = root / FOLDER / f"{self.name}.json"
-        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+        """As of any kept check, by default of this repository."""
+        return super().result(root)
 
     def is_current(self, root: Path = ROOT) -> bool:
-        """Whether the kept result rests on the files that lie here now."""
-        result = self.result(root)
-        return result is not None and result["inputs_sha256"] == self.inputs_sha256(root)
+        """As of any kept check, by default of this repository."""
+        return super().is_current(root)
+
+    def succeeds(self, root: Path = ROOT) -> bool:
+        """Run the command for its exit code alone."""
+        return (
+            subprocess.run(self.command, cwd=root, stdout=sys.stderr, check=False).returncode == 0
+        )
 
     def run(self, root: Path = ROOT) -> bool:
         """Run the command and keep what it says on stdout; False when it fails."""
@@ -84,19 +69,13 @@ class LongCheck:
             said = [
                 re.sub(r" in [\d.]+s( \([\d:]+\))?", "", line) for line in done.stdout.splitlines()
             ]
-        content = {"command": " ".join(self.command), "inputs_sha256": before, "said": said}
-        text = json.dumps(content, indent=1) + "\n"
-        (root / FOLDER / f"{self.name}.json").write_text(text, encoding="utf-8")
+        self.keep(root, before, said)
         return True
 
 
 def load_checks(root: Path = ROOT) -> list[LongCheck]:
     """The checks of results/checks.toml in their order."""
-    content = tomllib.loads((root / FOLDER / "checks.toml").read_text(encoding="utf-8"))
-    return [
-        LongCheck(name, tuple(check["command"]), tuple(check["inputs"]))
-        for name, check in content.items()
-    ]
+    return [LongCheck(c.name, c.command, c.inputs) for c in load_kept(root, LONG_CHECKS)]
 
 
 def main(names: list[str]) -> int:

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from tools.gates.coverage_record import Gap, Record, RecordError, load_record
+from tools.gates.records import gates, keep
 
 ROOT = Path(__file__).resolve().parents[2]
 COMPILER = ROOT / "tools" / "gates" / "clang_coverage.sh"
@@ -45,6 +46,17 @@ class FileCoverage:
         """Several copies of an inline function count as one."""
         before = self.conditions.get(place, [False] * len(covered))
         self.conditions[place] = [a or b for a, b in zip(before, covered, strict=True)]
+
+    def numbers(self) -> dict[str, int]:
+        """Ways of branches and conditions, and how many of them the tests reach."""
+        ways = [way for both in self.branches.values() for way in both]
+        conditions = [reached for each in self.conditions.values() for reached in each]
+        return {
+            "ways": len(ways),
+            "ways_reached": sum(ways),
+            "conditions": len(conditions),
+            "conditions_reached": sum(conditions),
+        }
 
     def gaps(self, source: str, text: list[str]) -> list[Gap]:
         """Every way of a branch and every condition that the tests did not reach."""
@@ -136,8 +148,12 @@ def main() -> int:
         print("not run: coverage; it needs what tools/debian_packages.sh installs", file=sys.stderr)
         return int("CI" in os.environ)
     try:
-        record = load_record(RECORD)
-        complaints = record.judge(measure(record, arguments.out.resolve()), ROOT)
+        record, inputs_sha256 = load_record(RECORD), gates()["coverage"].inputs_sha256()
+        found = measure(record, arguments.out.resolve())
+        complaints = record.judge(found, ROOT)
+        if not complaints:
+            numbers = {source: coverage.numbers() for source, coverage in sorted(found.items())}
+            keep("coverage", inputs_sha256, numbers)
     except RecordError as error:
         complaints = [str(error)]
     for complaint in complaints:

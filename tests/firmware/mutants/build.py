@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bms.native_build import FIRMWARE, FLAGS, ROOT
+from hil_sim.evidence.collect import mutants_hash
 from tests.firmware.mutants.generate import Mutant, mutants_of
 from tests.firmware.mutation import MODULE_PATH, CompiledFirmware
 from tests.firmware.native_library import FOLDERS
@@ -83,12 +84,7 @@ class Factory:
 
 def sources_hash(source: str) -> str:
     """Hash of a source and of the core's headers, on which its mutants rest."""
-    digest = hashlib.sha256()
-    folders = ("include", "src", "image", "boot", "port", "port/linux")
-    headers = [h for f in folders for h in sorted((ROOT / "firmware_c" / f).glob("*.h"))]
-    for path in (ROOT / source, *headers):
-        digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
-    return digest.hexdigest()
+    return mutants_hash(ROOT, source)
 
 
 def compiled_firmware(out: Path) -> CompiledFirmware:
