@@ -120,8 +120,8 @@ def require_checkout(root: Path = ROOT) -> None:
     """Raise InputError unless the records can lie here."""
     if not all((root / path).exists() for path in (LONG_CHECKS, GATES, REQUIREMENTS, PLAN)):
         raise InputError(
-            f"{root}: has no records, as an installed package has none; run 'bms evidence' in a "
-            "checkout of the repository"
+            f"{root}: has no records, as an installed package has none; run "
+            "'bms evidence --out DIR' in a checkout of the repository"
         )
 
 
