@@ -16,7 +16,9 @@ typedef char cells_fit[(BMS_MAX_CELLS <= PACK_GROUP_CELLS) ? 1 : -1];
 
 void pack_ecu_init(pack_ecu_t *ecu, const pack_ecu_config_t *config)
 {
-    *ecu = (pack_ecu_t){ .missing_cell = PACK_NO_CELL, .first_fault = FAULT_NONE };
+    /* Until a request says off, so that an ECU that restarts in mid-charge begins none. */
+    *ecu = (pack_ecu_t){ .missing_cell = PACK_NO_CELL, .first_fault = FAULT_NONE,
+                         .is_asked = true };
     pack_init(&ecu->pack, (config != NULL) ? &config->pack : NULL);
     monitor_reset(&ecu->monitor);
     ecu->pack_voltage_error_V = (config != NULL) ? config->pack_voltage_error_V : NAN;

@@ -61,7 +61,7 @@ typedef struct {
     pace_t pace;
     uint8_t measured_periods; /* since the last step, by the counter of PackElectrical */
     bool has_started; /* all messages were valid once, or had the time to become so */
-    bool is_asked;    /* for a charge, by the last usable request */
+    bool is_asked;    /* for a charge: no usable request since has said off */
     monitor_t monitor;       /* of the network's faults; the core has one for the rest */
     uint32_t latched_faults; /* of both, until the request goes off */
     uint8_t first_fault;

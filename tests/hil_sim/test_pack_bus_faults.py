@@ -20,6 +20,7 @@ from hil_sim.pack.settings import PackChargeSettings
 from hil_sim.pack.summary import margins
 
 ROOT = Path(__file__).parents[2]
+REQUEST_ID = 0x202
 PRESET, MODEL = load_pair("paper_calibrated", None)
 
 
@@ -82,6 +83,24 @@ def test_an_ecu_of_other_cells_than_the_plant_gives_no_current():
         plant.hold(None)
     assert heard.latched_faults >> FirstFault.REQUEST_INVALID & 1
     assert heard.latched_faults >> FirstFault.CORRUPTED_FRAMES & 1
+
+
+@pytest.mark.parametrize("missed", [0, 1, 49, 50])
+def test_an_ecu_that_restarts_in_mid_charge_begins_none_whenever_it_hears_the_request(missed):
+    """The states of charge at plug-in are of the past; only a request that was off begins anew."""
+    plant = PackPlant(settings_of())
+    ecu, wire = PackEcu(settings_of()), PackWire(settings_of(), plant)
+    for period in range(250):
+        plant.measure()
+        frames = wire.publish(charge=period > 20)
+        if period == 100:
+            assert plant.current_A < -1.0
+            ecu = PackEcu(settings_of())
+        if 100 <= period < 100 + missed:
+            frames = [frame for frame in frames if frame.frame_id != REQUEST_ID]
+        heard = wire.hear(ecu.exchange(frames))
+        plant.hold(obeyed_A(heard))
+        assert period < 100 or heard.command_A == 0.0 or np.isnan(heard.command_A)
 
 
 def test_two_commands_in_one_period_move_no_current():
