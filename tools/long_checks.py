@@ -15,9 +15,8 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
-from hil_sim.evidence.kept import LONG_CHECKS, KeptCheck, load_kept
+from hil_sim.evidence.kept import LONG_CHECKS, KeptCheck
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = Path("results")
@@ -25,18 +24,6 @@ FOLDER = Path("results")
 
 class LongCheck(KeptCheck):
     """A check that can be run."""
-
-    def inputs_sha256(self, root: Path = ROOT) -> str:
-        """As of any kept check, by default of this repository."""
-        return super().inputs_sha256(root)
-
-    def result(self, root: Path = ROOT) -> dict[str, Any] | None:
-        """As of any kept check, by default of this repository."""
-        return super().result(root)
-
-    def is_current(self, root: Path = ROOT) -> bool:
-        """As of any kept check, by default of this repository."""
-        return super().is_current(root)
 
     def succeeds(self, root: Path = ROOT) -> bool:
         """Run the command for its exit code alone."""
@@ -75,7 +62,7 @@ class LongCheck(KeptCheck):
 
 def load_checks(root: Path = ROOT) -> list[LongCheck]:
     """The checks of results/checks.toml in their order."""
-    return [LongCheck(c.name, c.command, c.inputs) for c in load_kept(root, LONG_CHECKS)]
+    return LongCheck.load(root, LONG_CHECKS)
 
 
 def main(names: list[str]) -> int:

@@ -9,7 +9,8 @@ import typer
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands.options import JsonOption
-from hil_sim.evidence import archive, collect, numbers, page
+from hil_sim.evidence.collect import collect
+from hil_sim.evidence.page import archive, numbers, page
 from hil_sim.report.folder import OutputFolder
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -14,12 +13,11 @@ from rich.console import Console
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.presets import Preset
 from bms.waiting import waiting
+from hil_sim.commands.recordings import outputs
 from hil_sim.faults import load_faults
-from hil_sim.logs import usable_format
 from hil_sim.logs.recorder import Recorder
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.report.files import summary_json, write_report
-from hil_sim.report.folder import OutputFolder
 from hil_sim.report.table import print_table
 from hil_sim.run.result import RunResult
 from hil_sim.run.settings import Settings
@@ -76,24 +74,13 @@ def charge_and_report(
     before the charge did. Raises InputError before the run when the folder or the log cannot be
     written.
     """
-    with ExitStack() as stack:
-        folder = stack.enter_context(OutputFolder(out)) if out is not None else None
-        log_folder = None
-        if log is not None:
-            usable_format(log)
-            log_folder = stack.enter_context(OutputFolder(log.parent, "--log"))
-        with ExitStack() as during_run:
-            paths = [folder.path("can.log")] if folder is not None else []
-            if log is not None and log_folder is not None:
-                paths.append(log_folder.path(log.name))
-            recorder = during_run.enter_context(Recorder(*paths)) if paths else None
+    with outputs(out, log) as kept:
+        with kept.recorder() as recorder:
             results = [_followed(settings, run, recorder)]
         results += [_followed(baseline, run, None) for baseline in baselines]
-        if folder is not None:
-            write_report(folder, settings, results)
-            folder.commit()
-        if log_folder is not None:
-            log_folder.commit()
+        if kept.folder is not None:
+            write_report(kept.folder, settings, results)
+        kept.commit()
     if as_json:
         print(json.dumps(summary_json(results), indent=2))
     else:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -15,8 +14,8 @@ from bms.model.pair import load_pair
 from bms.text_table import TextTable
 from bms.waiting import waiting
 from hil_sim.bus.buses import open_bus, require_shared
+from hil_sim.commands.recordings import outputs
 from hil_sim.commands.stopping import stop_event
-from hil_sim.logs import usable_format
 from hil_sim.logs.recorder import Recorder
 from hil_sim.nodes.ecu import EcuNode
 from hil_sim.pack.charge import PackResult, charge_pack, charge_pack_elsewhere
@@ -25,7 +24,6 @@ from hil_sim.pack.report import write_pack_report
 from hil_sim.pack.settings import PackChargeSettings
 from hil_sim.pack.spread_kind import SpreadKind
 from hil_sim.pack.summary import has_passed, summary
-from hil_sim.report.folder import OutputFolder
 
 
 class Charge(Protocol):
@@ -74,18 +72,8 @@ def charge_and_report_pack(
     log: Path | None,
 ) -> int:
     """Charge a pack, print and write what came of it, and return the exit code."""
-    with ExitStack() as stack:
-        folder = stack.enter_context(OutputFolder(out)) if out is not None else None
-        log_folder = None
-        if log is not None:
-            usable_format(log)
-            log_folder = stack.enter_context(OutputFolder(log.parent, "--log"))
-        with ExitStack() as during_run:
-            paths = [folder.path("can.log")] if folder is not None else []
-            if log is not None and log_folder is not None:
-                paths.append(log_folder.path(log.name))
-            recorder = during_run.enter_context(Recorder(*paths)) if paths else None
-            wait = during_run.enter_context(waiting("charging", 100, "% state of charge"))
+    with outputs(out, log) as kept:
+        with kept.recorder() as recorder, waiting("charging", 100, "% state of charge") as wait:
             done = 0
 
             def follow(soc: float) -> None:
@@ -96,11 +84,9 @@ def charge_and_report_pack(
                     done += step
 
             result = charge(settings, recorder, follow)
-        if folder is not None:
-            write_pack_report(folder, result)
-            folder.commit()
-        if log_folder is not None:
-            log_folder.commit()
+        if kept.folder is not None:
+            write_pack_report(kept.folder, result)
+        kept.commit()
     if as_json:
         print(json.dumps(summary(result), indent=2))
     else:

@@ -1,6 +1,4 @@
-"""What gates and long checks have recorded, collected for whoever assesses a product."""
+"""What gates and long checks have recorded, collected for whoever assesses a product.
 
-from hil_sim.evidence.collect import Evidence, collect
-from hil_sim.evidence.page import archive, numbers, page
-
-__all__ = ["Evidence", "archive", "collect", "numbers", "page"]
+`kept` is read before the firmware is loaded, so nothing is imported from here.
+"""

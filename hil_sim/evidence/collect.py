@@ -20,7 +20,7 @@ from bms import __version__
 from bms.errors import InputError
 from bms.firmware.image_header import FIRMWARE_VERSION
 from bms.native_build import ROOT
-from hil_sim.evidence.kept import GATES, LONG_CHECKS, KeptCheck, load_kept
+from hil_sim.evidence.kept import GATES, LONG_CHECKS, KeptCheck
 from hil_sim.evidence.trace import REQUIREMENTS, load_requirements
 
 if sys.version_info >= (3, 11):
@@ -129,8 +129,8 @@ def collect(root: Path = ROOT) -> Evidence:
     """What is recorded below a checkout; InputError for a record that cannot be read."""
     require_checkout(root)
     try:
-        long = {check.name: check for check in load_kept(root, LONG_CHECKS)}
-        gates = {check.name: check for check in load_kept(root, GATES)}
+        long = {check.name: check for check in KeptCheck.load(root, LONG_CHECKS)}
+        gates = {check.name: check for check in KeptCheck.load(root, GATES)}
         sections = tuple(_sections(root, long, gates))
     except (ValueError, LookupError, TypeError, AttributeError, OSError) as error:
         raise InputError(f"{root}: a record cannot be read ({error}); make it anew") from None

@@ -7,7 +7,9 @@ import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+from bms.native_build import ROOT
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -20,6 +22,9 @@ GATES = Path("tools/gates/records.toml")
 """Checks whose results are kept below build, where they were run."""
 
 
+Kept = TypeVar("Kept", bound="KeptCheck")
+
+
 @dataclass(frozen=True)
 class KeptCheck:
     """A command, the files (patterns in the repository) on which its answer rests, its list."""
@@ -29,13 +34,22 @@ class KeptCheck:
     inputs: tuple[str, ...]
     listed: Path = LONG_CHECKS
 
+    @classmethod
+    def load(cls: type[Kept], root: Path, listed: Path) -> list[Kept]:
+        """The checks of a list in their order."""
+        content = tomllib.loads((root / listed).read_text(encoding="utf-8"))
+        return [
+            cls(name, tuple(check["command"]), tuple(check["inputs"]), listed)
+            for name, check in content.items()
+        ]
+
     @property
     def path(self) -> Path:
         """Of the kept result, in the repository."""
         folder = Path("build/gates") if self.listed == GATES else self.listed.parent
         return folder / f"{self.name}.json"
 
-    def inputs_sha256(self, root: Path) -> str:
+    def inputs_sha256(self, root: Path = ROOT) -> str:
         """Hash of names and content of all inputs; ValueError when a pattern finds none."""
         paths: set[Path] = set()
         for pattern in self.inputs:
@@ -48,12 +62,12 @@ class KeptCheck:
             digest.update(f"\n{path.relative_to(root).as_posix()}\n".encode() + path.read_bytes())
         return digest.hexdigest()
 
-    def result(self, root: Path) -> dict[str, Any] | None:
+    def result(self, root: Path = ROOT) -> dict[str, Any] | None:
         """The kept result; None without one."""
         path = root / self.path
         return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
 
-    def is_current(self, root: Path) -> bool:
+    def is_current(self, root: Path = ROOT) -> bool:
         """Whether the kept result rests on the files that lie here now."""
         result = self.result(root)
         return result is not None and result["inputs_sha256"] == self.inputs_sha256(root)
@@ -64,12 +78,3 @@ class KeptCheck:
         path = root / self.path
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-
-
-def load_kept(root: Path, listed: Path) -> list[KeptCheck]:
-    """The checks of a list in their order."""
-    content = tomllib.loads((root / listed).read_text(encoding="utf-8"))
-    return [
-        KeptCheck(name, tuple(check["command"]), tuple(check["inputs"]), listed)
-        for name, check in content.items()
-    ]

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import struct
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
 
-from bms.errors import InputError
 from bms.text_table import TextTable
-from hil_sim.studies.cost.records import INSTRUCTION_SHIFT, TICK_NS
-from hil_sim.studies.pack.cost import BOARD
-from hil_sim.targets import Emulation
+from hil_sim.studies.pack.cost import counts, instructions_in
 
 PROGRAM = Path("build/firmware/mps2_an386/pack_ecu_cost.elf")
 BUILD_COMMAND = f"make -f firmware_c/pack_cost/pack_cost.mk {PROGRAM}"
 _COUNT = struct.Struct("<6I")
-_TIMEOUT_S = 300.0
 
 
 @dataclass(frozen=True)
@@ -34,26 +29,14 @@ class EcuInstructions:
 
 def ecu_instructions(program: Path = PROGRAM) -> list[EcuInstructions]:
     """Counted in QEMU; InputError where the program is not built or does not end well."""
-    if not program.is_file():
-        raise InputError(f"{program}: not built; run '{BUILD_COMMAND}'")
-    with tempfile.TemporaryDirectory() as name:
-        results = Path(name) / "counts"
-        semihosting = f"enable=on,target=native,arg=cost,arg={results}"
-        options = ("-icount", f"shift={INSTRUCTION_SHIFT}", "-semihosting-config", semihosting)
-        with Emulation(program, BOARD, options=options) as emulation:
-            status = emulation.wait(_TIMEOUT_S)
-        if status != 0:
-            raise InputError(f"{program}: has not ended well on {BOARD}; build it anew")
-        return [_of(*values) for values in _COUNT.iter_unpack(results.read_bytes())]
+    return [_of(*values) for values in counts(program, BUILD_COMMAND, _COUNT)]
 
 
 def _of(
     cells: int, frames: int, nothing: int, least: int, most: int, periods: int
 ) -> EcuInstructions:
-    def of(ticks: int) -> int:
-        return round((ticks - nothing) * TICK_NS / 2.0**INSTRUCTION_SHIFT)
-
-    return EcuInstructions(cells, frames, of(least), of(most), periods)
+    least, most = instructions_in(least, nothing), instructions_in(most, nothing)
+    return EcuInstructions(cells, frames, least, most, periods)
 
 
 def main() -> None:

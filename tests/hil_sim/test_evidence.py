@@ -13,7 +13,6 @@ import pytest
 
 from bms.errors import InputError
 from bms.native_build import ROOT
-from hil_sim.evidence import archive, collect, numbers, page
 from hil_sim.evidence.collect import (
     CURRENT,
     INCOMPLETE,
@@ -22,9 +21,11 @@ from hil_sim.evidence.collect import (
     PLAN,
     STALE,
     Item,
+    collect,
     mutants_hash,
 )
-from hil_sim.evidence.kept import GATES, LONG_CHECKS, load_kept
+from hil_sim.evidence.kept import GATES, LONG_CHECKS, KeptCheck
+from hil_sim.evidence.page import archive, numbers, page
 from hil_sim.evidence.trace import load_requirements
 from tests.hil_sim.command_line import bms
 
@@ -40,7 +41,9 @@ SAID = {
     "instructions": [{"target": "m3"}],
     "certificates": {"lin2014": {"certified": True}},
 }
-LISTED = [(file, check.name) for file in (GATES, LONG_CHECKS) for check in load_kept(ROOT, file)]
+LISTED = [
+    (file, check.name) for file in (GATES, LONG_CHECKS) for check in KeptCheck.load(ROOT, file)
+]
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +52,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("checkout") / "tree"
     shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(*LEFT_OUT))
     for listed in (GATES, LONG_CHECKS):
-        for check in load_kept(root, listed):
+        for check in KeptCheck.load(root, listed):
             said = SAID[check.name] if listed == GATES else (check.result(root) or {})["said"]
             check.keep(root, check.inputs_sha256(root), said)
     sources = collect_sources(root)
@@ -101,7 +104,7 @@ def test_a_checkout_whose_records_are_of_its_own_files_is_complete(tree: Path) -
 def test_a_record_is_stale_once_an_input_has_changed_and_missing_without_it(
     tree: Path, listed: Path, name: str
 ) -> None:
-    (check,) = [c for c in load_kept(tree, listed) if c.name == name]
+    (check,) = [c for c in KeptCheck.load(tree, listed) if c.name == name]
     first = min(path for path in tree.glob(check.inputs[0]) if path.is_file())
     assert item(tree, name).state == CURRENT
     with Changed(first, first.read_bytes() + b"\n"):
@@ -115,7 +118,7 @@ def test_a_record_is_stale_once_an_input_has_changed_and_missing_without_it(
 
 def test_what_a_record_says_is_what_is_reported(tree: Path) -> None:
     for listed, name in LISTED:
-        (check,) = [c for c in load_kept(tree, listed) if c.name == name]
+        (check,) = [c for c in KeptCheck.load(tree, listed) if c.name == name]
         said = (check.result(tree) or {})["said"]
         shown = item(tree, name).numbers
         assert said == (shown["said"] if name == "three-places" else shown)

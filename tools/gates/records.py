@@ -8,14 +8,13 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from hil_sim.evidence.kept import GATES, load_kept
+from hil_sim.evidence.kept import GATES
 from tools.long_checks import ROOT, LongCheck
 
 
 def gates() -> dict[str, LongCheck]:
     """The gates of records.toml by name."""
-    kept = load_kept(ROOT, GATES)
-    return {c.name: LongCheck(c.name, c.command, c.inputs, c.listed) for c in kept}
+    return {gate.name: gate for gate in LongCheck.load(ROOT, GATES)}
 
 
 def keep(name: str, inputs_sha256: str, said: Any) -> None:

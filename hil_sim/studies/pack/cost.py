@@ -48,10 +48,13 @@ class Instructions:
     pack_bytes: int
 
 
-def instructions(program: Path = PROGRAM) -> list[Instructions]:
-    """Counted in QEMU; InputError where the program is not built or does not end well."""
+def counts(program: Path, build_command: str, record: struct.Struct) -> list[tuple[int, ...]]:
+    """Records that a counting program writes in QEMU.
+
+    Raises InputError where the program is not built or does not end well.
+    """
     if not program.is_file():
-        raise InputError(f"{program}: not built; run '{BUILD_COMMAND}'")
+        raise InputError(f"{program}: not built; run '{build_command}'")
     with tempfile.TemporaryDirectory() as name:
         results = Path(name) / "counts"
         semihosting = f"enable=on,target=native,arg=cost,arg={results}"
@@ -60,16 +63,24 @@ def instructions(program: Path = PROGRAM) -> list[Instructions]:
             status = emulation.wait(_TIMEOUT_S)
         if status != 0:
             raise InputError(f"{program}: has not ended well on {BOARD}; build it anew")
-        return [_instructions(*values) for values in _COUNT.iter_unpack(results.read_bytes())]
+        return list(record.iter_unpack(results.read_bytes()))
+
+
+def instructions_in(ticks: int, nothing: int) -> int:
+    """Instructions in ticks of the timer, of which `nothing` are those of the reading itself."""
+    return round((ticks - nothing) * TICK_NS / 2.0**INSTRUCTION_SHIFT)
+
+
+def instructions(program: Path = PROGRAM) -> list[Instructions]:
+    """Of the pack's core, counted in QEMU; InputError as `counts`."""
+    return [_instructions(*values) for values in counts(program, BUILD_COMMAND, _COUNT)]
 
 
 def _instructions(
     cells: int, rising: int, pack_bytes: int, nothing: int, least: int, most: int, periods: int
 ) -> Instructions:
-    def of(ticks: int) -> int:
-        return round((ticks - nothing) * TICK_NS / 2.0**INSTRUCTION_SHIFT)
-
-    return Instructions(cells, bool(rising), of(least), of(most), periods, pack_bytes)
+    least, most = instructions_in(least, nothing), instructions_in(most, nothing)
+    return Instructions(cells, bool(rising), least, most, periods, pack_bytes)
 
 
 def host_us(cells: int, periods: int = 200, repeats: int = 25) -> float:
