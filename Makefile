@@ -100,7 +100,7 @@ long-checks: .venv/tests build/extensions ## What takes too long for make test (
 	$(BIN)/python tools/long_checks.py $(CHECKS)
 
 ifdef TARGET
-fuzz: .venv/tests .venv/gates build/extensions ## 10^7 damaged frames, 10^6 damaged logs (SEED=n for others); or libFuzzer: TARGET=session|clock|slcan|calibration SECONDS=60
+fuzz: .venv/tests .venv/gates build/extensions ## 10^7 damaged frames, 10^6 damaged logs (SEED=n for others); or libFuzzer: TARGET=session|clock|slcan|image|calibration SECONDS=60
 	$(BIN)/python -m tests.firmware.fuzz.run $(TARGET) $(or $(SECONDS),60) $(or $(SEED),1)
 else
 fuzz: fuzz-frames fuzz-logs

@@ -11,6 +11,10 @@
 /* What every layout begins with: layout and hashes. */
 #define SHORTEST_CALIBRATION \
     ((uint32_t)(sizeof(image_header_t) + offsetof(bms_calibration_t, sampling_period_s)))
+/* What every calibration of this layout has: all up to the tables, and with it their number. */
+#define UP_TO_TABLES                                                                  \
+    ((uint32_t)sizeof(image_header_t) + (uint32_t)offsetof(bms_calibration_t, kan) + \
+     (uint32_t)offsetof(kan_model_t, tables))
 #define ERASED 0xFFFFFFFFu
 #define THUMB_BIT 1u
 #define STACK_ALIGNMENT 8u
@@ -139,10 +143,13 @@ image_status_t image_check_calibration(const image_memory_t *place,
     }
     const bms_calibration_t *calibration =
         (const bms_calibration_t *)(const void *)&place->bytes[sizeof *header];
-    return ((calibration->layout == header->calibration_layout) &&
-            (header->length == sizeof *header + content_calibration_length(calibration)) &&
-            (calibration->model_hash == header->model_hash) &&
-            (calibration->preset_hash == header->preset_hash))
-               ? IMAGE_OK
-               : IMAGE_WRONG_CONTENT;
+    const bool has_layout = calibration->layout == header->calibration_layout;
+    const bool is_short = has_layout && (header->length < UP_TO_TABLES);
+    const bool is_its_own =
+        has_layout && !is_short &&
+        (header->length == sizeof *header + content_calibration_length(calibration)) &&
+        (calibration->model_hash == header->model_hash) &&
+        (calibration->preset_hash == header->preset_hash);
+    const image_status_t wrong = is_short ? IMAGE_WRONG_LENGTH : IMAGE_WRONG_CONTENT;
+    return is_its_own ? IMAGE_OK : wrong;
 }

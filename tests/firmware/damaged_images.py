@@ -153,6 +153,9 @@ def damaged_images(image: bytes) -> dict[str, Damaged]:
         "calibration too short": bad_calibration(
             "WRONG_LENGTH", resealed(calibration, length=HEADER_LENGTH)
         ),
+        "calibration shorter than any model": bad_calibration(
+            "WRONG_LENGTH", resealed(calibration[:900], length=900)
+        ),
         "calibration shorter than its model": bad_calibration(
             "WRONG_CONTENT", resealed(calibration[:-4], length=len(calibration) - 4)
         ),
@@ -219,6 +222,14 @@ class BootStage:
         calibration = self._place(image, CALIBRATION.address, CALIBRATION.length)
         status = lib.image_check_calibration(calibration, header)
         return ("", "OK") if status == lib.IMAGE_OK else ("CALIBRATION", self._name(status))
+
+    def calibration_status_at(self, address: int, length: int, header: bytes) -> int:
+        """What a calibration in memory of this process is for the application of the header."""
+        ffi = self._ffi
+        place = ffi.new("image_memory_t *", {"length": length})
+        place.bytes = ffi.cast("uint8_t *", address)
+        of = ffi.from_buffer("image_header_t *", header)
+        return int(self._lib.image_check_calibration(place, of))
 
     def _name(self, status: int) -> str:
         names = self._ffi.typeof("image_status_t").elements

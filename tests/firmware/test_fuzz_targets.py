@@ -12,7 +12,7 @@ from tests.firmware.fuzz.build import TARGETS, Builder, Change, corpus_of, has_l
 from tests.firmware.fuzz.seeds import corpora
 from tests.firmware.ports import needs_compiler
 
-RUNS = {"session": 2000, "clock": 1000, "slcan": 20_000, "calibration": 2000}
+RUNS = {"session": 2000, "clock": 1000, "slcan": 20_000, "image": 20_000, "calibration": 2000}
 LARGEST_CORPUS = 32_768
 
 BROKEN = {
@@ -156,6 +156,79 @@ BROKEN = {
         "slcan",
         "a frame lost in silence",
         Change("port/slcan_link.c", "link->frames_lost++;", ""),
+    ),
+    "a model's sizes behind the part": (
+        "image",
+        "AddressSanitizer",
+        Change("image/image.c", "(header->length < UP_TO_TABLES)", "false"),
+    ),
+    "a boot stage of three bytes": (
+        "image",
+        "AddressSanitizer",
+        Change(
+            "image/image.c",
+            "if (place->length < sizeof(uint32_t))",
+            "if (place->length > 1000000u)",
+        ),
+    ),
+    "any checksum": (
+        "image",
+        "a damaged boot stage is taken",
+        Change(
+            "image/image.c",
+            "== *crc32) ? IMAGE_OK : IMAGE_WRONG_CRC",
+            "== *crc32) ? IMAGE_OK : IMAGE_OK",
+        ),
+    ),
+    "any length": (
+        "image",
+        "AddressSanitizer",
+        Change("image/image.c", "|| (header->length > place->length)", ""),
+    ),
+    "any hash": (
+        "image",
+        "an edited part is taken",
+        Change(
+            "image/image.c",
+            "return (hash[0] == header->content_hash) &&",
+            "return (hash[0] != hash[1]) ||",
+        ),
+    ),
+    "any board": (
+        "image",
+        "an application for another board is taken",
+        Change(
+            "image/image.c", "if (header->target != target)", "if (header->target == 0u * target)"
+        ),
+    ),
+    "any start": (
+        "image",
+        "a start outside of the part is taken",
+        Change("image/image.c", "(is_stack_right && is_start_right)", "is_stack_right"),
+    ),
+    "any stack": (
+        "image",
+        "a stack outside of RAM is taken",
+        Change("image/image.c", "(is_stack_right && is_start_right)", "is_start_right"),
+    ),
+    "any version": (
+        "image",
+        "an application older than the floor is taken",
+        Change("image/image.c", "(application->firmware_version >= floor->version)", "true"),
+    ),
+    "any length of tables": (
+        "image",
+        "a calibration whose tables do not end with it is taken",
+        Change(
+            "image/image.c",
+            "(header->length == sizeof *header + content_calibration_length(calibration)) &&",
+            "",
+        ),
+    ),
+    "any origin": (
+        "image",
+        "a calibration of another origin",
+        Change("image/image.c", "(calibration->model_hash == header->model_hash) &&", ""),
     ),
     "any voltage": (
         "calibration",

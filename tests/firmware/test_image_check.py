@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import ctypes
+import mmap
+import os
 import random
+import struct
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from bms.errors import InputError
+from bms.firmware._firmware import ffi
 from bms.firmware.image_checks import IMAGE_OK, IMAGE_STATUS_NAMES
 from bms.image import Header, check_image
 from bms.image.check import REASONS, check_calibration
@@ -39,6 +44,8 @@ HEADERS = [
 ]
 HEADERS += ["image/image.h", "image/content.h"]
 SAMPLE = 1500
+MODEL_OFFSET = ffi.offsetof("bms_calibration_t", "kan")
+TABLES_OFFSET = ffi.offsetof("kan_model_t", "tables")
 
 # (replaced text, replacement): each takes one check away.
 MUTANTS = {
@@ -66,10 +73,11 @@ MUTANTS = {
     "calibration layout": ("(header->calibration_layout != application->calibration_layout) ||", ""),
     "calibration length": ("||\n        (header->calibration_length != application->calibration_length)", ""),
     "end of the tables": ("(header->length == sizeof *header + content_calibration_length(calibration)) &&", ""),
+    "fixed part of the model": ("(header->length < UP_TO_TABLES)", "(header->length < 16u)"),
     "firmware version": ("if (header->firmware_version != application->firmware_version)", "if (false)"),
     "model": ("(calibration->model_hash == header->model_hash) &&", ""),
-    "preset": ("&&\n            (calibration->preset_hash == header->preset_hash)", ""),
-    "block layout": ("(calibration->layout == header->calibration_layout) &&", ""),
+    "preset": ("&&\n        (calibration->preset_hash == header->preset_hash)", ""),
+    "block layout": ("has_layout && !is_short &&", "!is_short &&"),
 }  # fmt: skip
 
 
@@ -145,6 +153,78 @@ def test_a_calibration_part_that_ends_before_its_model_is_refused(length: int) -
     short = resealed(calibration[:length], length=length)
     with pytest.raises(InputError, match="calibration"):
         check_calibration(short, content, "part")
+
+
+class GuardedMemory:
+    """A part aligned as in flash, behind whose last double word nobody reads and goes on."""
+
+    def __init__(self, content: bytes) -> None:
+        content += bytes(-len(content) % 8)
+        room = -(-len(content) // mmap.PAGESIZE) * mmap.PAGESIZE
+        self._map = mmap.mmap(-1, room + mmap.PAGESIZE)
+        self._map[room - len(content) : room] = content
+        start = ctypes.addressof(ctypes.c_char.from_buffer(self._map))
+        self.address = start + room - len(content)
+        protect = ctypes.CDLL(None, use_errno=True).mprotect
+        protect.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int]
+        assert protect(start + room, mmap.PAGESIZE, 0) == 0
+
+
+def verdict_in_a_process_of_its_own(boot_stage: BootStage, part: bytes, header: bytes) -> int:
+    """What the check of a calibration says; -11 where it reads behind the part."""
+    memory = GuardedMemory(part)
+    child = os.fork()
+    if child == 0:
+        os._exit(boot_stage.calibration_status_at(memory.address, len(part), header))
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+@pytest.mark.parametrize("sizes_fit", [True, False], ids=["sizes", "sizes beyond all bounds"])
+@pytest.mark.parametrize("short_by", [4, 0, -4])
+def test_sizes_of_a_model_are_read_only_where_the_part_has_them(
+    boot_stage: BootStage, short_by: int, sizes_fit: bool
+) -> None:
+    """Both sides of the shortest calibration: all that every model has, and no table."""
+    application, calibration = parts(image())
+    shortest = HEADER_LENGTH + MODEL_OFFSET + TABLES_OFFSET
+    if not sizes_fit:
+        layers = HEADER_LENGTH + MODEL_OFFSET
+        calibration = calibration[:layers] + b"\xff" * 4 + calibration[layers + 4 :]
+    part = resealed(calibration[: shortest - short_by], length=shortest - short_by)
+    status = verdict_in_a_process_of_its_own(boot_stage, part, application[:HEADER_LENGTH])
+    expected = "IMAGE_WRONG_LENGTH" if short_by > 0 else "IMAGE_WRONG_CONTENT"
+    assert IMAGE_STATUS_NAMES.get(status, f"signal {-status}") == expected
+
+
+@pytest.mark.parametrize("length", [56, 64, 200, 1000])
+def test_the_check_reads_nothing_behind_a_part(boot_stage: BootStage, length: int) -> None:
+    application, calibration = parts(image())
+    part = resealed(calibration[:length], length=length)
+    status = verdict_in_a_process_of_its_own(boot_stage, part, application[:HEADER_LENGTH])
+    assert IMAGE_STATUS_NAMES.get(status, f"signal {-status}") == "IMAGE_WRONG_LENGTH"
+
+
+def test_a_part_that_ends_where_its_model_would_begin_is_refused(boot_stage: BootStage) -> None:
+    """Erased flash behind it is no model of no length."""
+    content = image()
+    _, calibration = parts(content)
+    end = HEADER_LENGTH + MODEL_OFFSET
+    part = resealed(calibration[:end], length=end)
+    short = content[: CALIBRATION.address] + part
+    assert boot_stage.verdict(short) == ("CALIBRATION", "WRONG_LENGTH")
+    assert not host_takes(short)
+
+
+def test_a_shorter_calibration_of_an_older_layout_is_told_by_its_layout(
+    boot_stage: BootStage,
+) -> None:
+    content = image()
+    application, calibration = parts(content)
+    layout = Header.parse(application).calibration_layout - 1
+    old = struct.pack("<I", layout) + calibration[HEADER_LENGTH + 4 : 400]
+    part = resealed(calibration[:HEADER_LENGTH] + old, length=400, calibration_layout=layout)
+    verdict = boot_stage.verdict(content[: CALIBRATION.address] + part)
+    assert verdict == ("CALIBRATION", "WRONG_CALIBRATION_LAYOUT")
 
 
 def test_noise_is_refused(boot_stage: BootStage) -> None:

@@ -38,6 +38,7 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
             ("clock_target", "watch"), ("session",), ("src/*.c", "generated/*.c", "port/ecu_loop.c")
         ),
         "slcan": Target(("slcan_target",), core=("port/slcan*.c", "port/ring.c")),
+        "image": Target(("image_target",), core=("src/*.c", "generated/*.c", "image/*.c")),
         "calibration": Target(("calibration_target", "watch"), ("session",)),
     }
 )

@@ -150,6 +150,61 @@ def _patches(*changes: tuple[int, int | float]) -> bytes:
     return bytes((len(changes),)) + words
 
 
+def _image() -> Iterator[tuple[str, bytes]]:
+    def field(name: str) -> int:
+        return ffi.offsetof("image_header_t", name)
+
+    def calibration(length: int, *changes: tuple[int, int | float], choice: int = 0) -> bytes:
+        return bytes((choice,)) + struct.pack("<H", length) + _patches(*changes)
+
+    def application(
+        length: int,
+        *changes: tuple[int, int],
+        floor: tuple[int, int] = (0xFFFFFFFF, 0xFFFFFFFF),
+        choice: int = 1,
+    ) -> bytes:
+        start = bytes((choice,)) + struct.pack("<H", length)
+        return start + _patches(*changes) + struct.pack("<2I", *floor)
+
+    layers = _HEADER + ffi.offsetof("bms_calibration_t", "kan")
+    yield "calibration", calibration(0)
+    for length in (1, 48, 56, 60, 64, 1000, layers, _FIXED - 4, _FIXED, _FIXED + 4):
+        yield f"calibration of {length} bytes", calibration(length)
+    yield "no layers, no model", calibration(layers, (layers, 0xFFFFFFFF))
+    yield "damaged calibration", calibration(0, (200, 7), choice=4)
+    yield "edited calibration", calibration(0, (200, 7), choice=12)
+    for name in (
+        "magic",
+        "length",
+        "header_layout",
+        "target",
+        "firmware_version",
+        "calibration_layout",
+    ):
+        yield f"calibration with another {name}", calibration(0, (field(name), 1))
+        yield f"application with another {name}", application(192, (field(name), 129))
+    for name in ("calibration_length", "model_hash", "preset_hash"):
+        yield f"calibration with another {name}", calibration(0, (field(name), 1))
+    yield "block of another layout", calibration(0, (_HEADER, 4))
+    yield "another number of layers", calibration(0, (layers, 1))
+    yield "application", application(192)
+    yield "damaged application", application(192, (180, 1), choice=5)
+    yield "edited application", application(192, (180, 1), choice=13)
+    for length in (0, 48, 128, 132, 136):
+        yield f"application of {length} bytes", application(length, (8, length))
+    yield "application cut off", application(188)
+    for top in (0x20000000, 0x20001004, 0x20001008, 0x1FFFFFF8):
+        yield f"stack at {top:08x}", application(192, (128, top))
+    for start in (0x1000, 0x1001, 0x1080, 0x107F, 0x10C1, 0x10BF):
+        yield f"start at {start:08x}", application(192, (132, start))
+    yield "at the floor", application(192, floor=(4, 0xFFFFFFFB))
+    yield "below the floor", application(192, floor=(5, 0xFFFFFFFA))
+    yield "damaged floor", application(192, floor=(3, 0xFFFFFFFB))
+    for length in (0, 1, 3, 4, 8, 40):
+        yield f"boot stage of {length} bytes", b"\x02" + bytes(range(length))
+    yield "damaged boot stage", b"\x06" + bytes(range(40))
+
+
 _RAISED = {
     "reference_current_A": -4000.0,
     "sampling_period_s": 11.0,
@@ -202,6 +257,7 @@ def corpora() -> dict[str, dict[str, bytes]]:
         "session": _session(),
         "clock": _clock(),
         "slcan": _slcan(),
+        "image": _image(),
         "calibration": _calibration(),
     }
     return {
