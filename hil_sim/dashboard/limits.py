@@ -30,6 +30,22 @@ TIGHTENED = (
 """Keys of [limits] that may be lowered. The strongest current is not among them: the model was
 trained up to it, and a request may ask for less."""
 
+_STEPS = {
+    "max_voltage_V": (0.02, 0.05),
+    "max_core_temperature_K": (2.0, 5.0),
+    "max_surface_temperature_K": (2.0, 5.0),
+    "completion_soc": (0.1, 0.2),
+}
+"""By how much files without a server have each limit lowered."""
+
+
+def steps(preset: Preset) -> dict[str, list[str]]:
+    """The values that files without a server have of each limit, one limit at a time."""
+    limits = preset.limits
+    return {
+        key: [f"{getattr(limits, key) - step:.10g}" for step in by] for key, by in _STEPS.items()
+    }
+
 
 def tightened(name: str, wanted: Mapping[str, str]) -> tuple[Preset, str]:
     """The preset, by name or path, with some limits lowered, and the text of its file.

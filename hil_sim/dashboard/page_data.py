@@ -37,18 +37,21 @@ _LIMITS = {
 
 
 def config_data(
-    bus: str | None, chosen: str = DEFAULT_PRESET, makes_limits: bool = False
+    bus: str | None,
+    chosen: str = DEFAULT_PRESET,
+    limits: Mapping[str, Mapping[str, Sequence[str]]] | None = None,
 ) -> dict[str, Any]:
     """What there is to show: a bus or none, and the presets, the chosen one first.
 
-    Only a server can make the calibration of limits that are asked for.
+    `limits` are the values by preset and limit, one limit at a time, of which there are files;
+    None where a server makes the calibration of any.
     """
     others = [name for name in preset_names() if name != chosen]
     return {
         "bus": bus,
         "presets": [chosen, *others],
         "packs": DEFAULT_PRESET,
-        "makes_limits": makes_limits,
+        "limits": limits,
     }
 
 

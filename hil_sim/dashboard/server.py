@@ -71,7 +71,7 @@ def make_app(
     ModelMismatchError as load_pair.
     """
     chosen, _ = load_pair(preset, model)
-    config = config_data(bus, chosen.name, makes_limits=True)
+    config = config_data(bus, chosen.name)
     makers: dict[str, Maker] = {"config": lambda: config, "database": database_data}
     places: dict[str, tuple[str, Path | None]] = {}
     for name in config["presets"]:

@@ -12,12 +12,14 @@ import pytest
 
 from bms.presets import load_preset
 from hil_sim.bus.catalog import Mode
+from hil_sim.dashboard.site import write_site
 from hil_sim.logs.recorder import Recorder
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import ControllerKind, Settings
 from tests.hil_sim.dashboard_page import (
     SIZE,
     apply_limits,
+    as_files,
     browser,
     dashboard,
     draw_charge,
@@ -182,6 +184,34 @@ def test_a_limit_that_is_refused_leaves_the_one_in_force(page):
     assert page.get_attribute("body", "data-run") == "1"
     assert "323 K" in page.inner_text("#readings")
     assert page.locator("#save-preset").is_hidden()
+
+
+def test_as_files_without_a_server_a_limit_is_lowered_in_the_steps_there_are(
+    chromium, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("hil_sim.dashboard.page_data.preset_names", list)
+    write_site(tmp_path / "site")
+    with as_files(tmp_path / "site") as address:
+        page = chromium.new_page(viewport=SIZE)
+        page.goto(address)
+        page.wait_for_selector("#rows li")
+        assert "Core temperature, K 321 or 318" in page.inner_text("#limits-note")
+        set_speed(page, "as fast as it goes")
+        wait_for_end(page)
+        message = page.locator("#message")
+        apply_limits(page, max_core_temperature_K=319)
+        message.get_by_text("these files have 321 or 318, not '319'").wait_for()
+        apply_limits(page, max_core_temperature_K=318, max_voltage_V=3.58)
+        message.get_by_text("one tighter limit at a time").wait_for()
+        apply_limits(page, max_core_temperature_K=323, max_voltage_V=3.6, max_soc=0.995)
+        message.get_by_text("limits.max_soc: these files have only the preset's").wait_for()
+        apply_limits(page, max_core_temperature_K=318, max_soc=1)
+        wait_for_end(page, run=2)
+        tight = load_preset(saved(page, tmp_path, "preset.toml"))
+        assert tight.limits.max_core_temperature_K == 318.0
+        log = saved_log(page, tmp_path)
+        assert log.read_bytes() == logged(tight, tmp_path / "sil.log", mode=Mode.FASTEST)
+        page.close()
 
 
 def test_a_calibration_that_the_firmware_refuses_leaves_the_one_in_force(page, preset, tmp_path):

@@ -256,7 +256,21 @@ def test_as_files_it_has_what_the_server_hands_out(address, tmp_path, monkeypatc
     write_site(tmp_path)
     names = config_data(None)["presets"]
     paths = [f"data/{name}{end}.json" for name in names for end in ("", ".rows")]
-    assert json.loads((tmp_path / "data" / "config.json").read_text())["bus"] is None
+    config = json.loads((tmp_path / "data" / "config.json").read_text())
+    assert config["bus"] is None
+    made = {
+        (name, limit, value): json.loads(
+            (tmp_path / "limits" / name / f"{limit}={value}.json").read_text()
+        )
+        for name, limits in config["limits"].items()
+        for limit, values in limits.items()
+        for value in values
+    }
+    assert len(made) == len(list(tmp_path.rglob("limits/*/*.json"))) == 16
+    assert ("lin2014", "max_core_temperature_K", "318") in made
+    for (name, limit, value), tighter in list(made.items())[::5]:
+        served = json.loads(get(address, f"/limits/{name}.json?{limit}={value}")[2])
+        assert tighter == served and "error" not in served
     for path in ["index.html", "page.wasm", "data/database.json", *paths]:
         assert get(address, f"/{path}")[2] == (tmp_path / path).read_bytes()
     assert len(paths) == 4

@@ -79,8 +79,11 @@ export interface Config {
   bus: string | null; // that is shown live
   presets: string[]; // the first is the one to begin with
   packs: string; // the preset that there are packs of
-  makes_limits: boolean; // there is a server that makes the calibration of tighter limits
+  limits: LimitFiles | null; // null where a server makes the calibration of any tighter limits
 }
+
+/** By preset and limit the values of which there are files, one limit at a time. */
+export type LimitFiles = Record<string, Record<string, string[]>>;
 
 /** A preset whose limits were lowered, and its file. */
 export interface Tightened {
@@ -89,9 +92,15 @@ export interface Tightened {
   file: string;
 }
 
-/** Limits by their keys in a preset; the server's reason in an Error where it refuses them. */
-export async function fetchTightened(name: string, limits: Record<string, string>): Promise<Tightened> {
-  const response = await fetch(`limits/${name}.json?${new URLSearchParams(limits)}`);
+/** Limits by their keys in a preset; the reason in an Error where they are refused. */
+export async function fetchTightened(
+  name: string,
+  limits: Record<string, string>,
+  files: LimitFiles | null,
+): Promise<Tightened> {
+  const response = await fetch(
+    files === null ? `limits/${name}.json?${new URLSearchParams(limits)}` : fileOf(name, limits, files[name] ?? {}),
+  );
   if (!response.ok) {
     throw new Error(`the server answers ${response.status} when asked for limits; reload the page`);
   }
@@ -100,6 +109,24 @@ export async function fetchTightened(name: string, limits: Record<string, string
     throw new Error(made.error);
   }
   return made;
+}
+
+function fileOf(name: string, limits: Record<string, string>, made: Record<string, string[]>): string {
+  const asked = Object.entries(limits);
+  for (const [limit, said] of asked) {
+    const value = made[limit]?.find((one) => Number(one) === Number(said));
+    if (value === undefined || said.trim() === "") {
+      const choice = made[limit]?.join(" or ");
+      throw new Error(
+        `limits.${limit}: these files have ${choice ?? "only the preset's"}, ` +
+          `not '${said.slice(0, 40)}'; 'bms dashboard' makes any that is tighter`,
+      );
+    }
+    if (asked.length === 1) {
+      return `limits/${name}/${limit}=${value}.json`;
+    }
+  }
+  throw new Error("these files have one tighter limit at a time; 'bms dashboard' makes any together");
 }
 
 export async function fetchData<T>(path: string): Promise<T> {

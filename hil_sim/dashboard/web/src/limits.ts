@@ -1,14 +1,13 @@
 // The limits of a preset as controls. They can only be lowered: its certificate, its model and the
-// bound of its error are for what it allows. The server derives all that follows from a limit.
+// bound of its error are for what it allows. Python derives all that follows from a limit: a server when
+// it is asked, or beforehand, for some values, into files.
 
-import { fetchTightened, type Limits, type PresetData, type Tightened } from "./data";
+import { fetchTightened, type LimitFiles, type Limits, type PresetData, type Tightened } from "./data";
 import { byId, setText } from "./dom";
 
 const REASON =
   "Tighter only: certificate, model and its error bound are for the preset's own. " +
   "The strongest current is part of the request.";
-const WITHOUT_SERVER =
-  "Only 'bms dashboard' makes the calibration of other limits; these files have the preset's.";
 
 export interface LimitsListener {
   apply(tightened: Tightened): void;
@@ -23,7 +22,7 @@ export class LimitControls {
   private file: string | null = null; // of the limits in force, where they are not the preset's
 
   constructor(
-    private readonly canChange: boolean,
+    private readonly files: LimitFiles | null,
     private readonly listener: LimitsListener,
   ) {
     byId("limits").addEventListener("submit", (event) => {
@@ -32,10 +31,6 @@ export class LimitControls {
     });
     byId("own-limits").addEventListener("click", () => this.own && listener.reset(this.own.name));
     byId("save-preset").addEventListener("click", () => this.file && listener.save(this.file));
-    const buttons = ["apply-limits", "own-limits"].map((id) => byId<HTMLButtonElement>(id));
-    for (const field of [...this.inputs, ...buttons]) {
-      field.disabled = !canChange;
-    }
   }
 
   /** The preset as it ships, which is the loosest that can be had. */
@@ -59,12 +54,19 @@ export class LimitControls {
   }
 
   private get note(): string {
-    if (!this.canChange) {
-      return WITHOUT_SERVER;
+    if (this.file !== null) {
+      return "A log of this run replays with the file: bms replay can.log --preset preset.toml";
     }
-    return this.file === null
-      ? REASON
-      : "A log of this run replays with the file: bms replay can.log --preset preset.toml";
+    return this.files === null ? REASON : `${REASON} ${this.filed}`;
+  }
+
+  /** What there are files of, in the words of the form. */
+  private get filed(): string {
+    const made = this.files?.[this.own?.name ?? ""] ?? {};
+    const choices = Object.entries(made).map(
+      ([limit, values]) => `${byId(limit).parentElement!.innerText.trim()} ${values.join(" or ")}`,
+    );
+    return `These files have one at a time: ${choices.join("; ")}. 'bms dashboard' makes any.`;
   }
 
   private get inputs(): HTMLInputElement[] {
@@ -86,7 +88,7 @@ export class LimitControls {
       return;
     }
     try {
-      this.asked = await fetchTightened(own.name, wanted);
+      this.asked = await fetchTightened(own.name, wanted, this.files);
       this.listener.apply(this.asked);
     } catch (error) {
       this.listener.refused(error instanceof Error ? error.message : String(error));

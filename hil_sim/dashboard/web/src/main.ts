@@ -103,7 +103,7 @@ async function simulate(config: Config, database: Database): Promise<void> {
     save: () => post({ type: "log" }),
   });
   let rowsOf: { preset: PresetData; rows: Row[] } | null = null; // that the firmware is asked to take
-  const limits = new LimitControls(config.makes_limits, {
+  const limits = new LimitControls(config.limits, {
     apply: ({ preset: chosen, rows }) => {
       rowsOf = { preset: chosen, rows };
       loadAgain(chosen);
