@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from bms.data.cooling import Cooling
 from bms.data.lags import Lags
 from bms.data.profiles import KINDS, Kind, draw_profiles
-from bms.data.simulate import Samples, simulate
+from bms.data.simulate import Samples, simulate_sets
 from bms.presets import Preset
 
 Split = Literal["training", "validation", "test", "evaluation"]
@@ -40,12 +41,25 @@ def simulated_split(
     "evaluation" is used nowhere in training, so that `bms evaluate` shows profiles that not even
     e_max was read from.
     """
-    profiles = PROFILES_OF_EACH_KIND[split] if count is None else count
-    rng = np.random.default_rng([seed, _SPLITS.index(split)])
-    return {
-        kind: simulate(preset, draw_profiles(preset, kind, profiles, rng), rng, lags, cooling)
-        for kind in KINDS
-    }
+    counts = {split: PROFILES_OF_EACH_KIND[split] if count is None else count}
+    return simulated_splits(preset, counts, seed, lags, cooling)[split]
+
+
+def simulated_splits(
+    preset: Preset,
+    counts: Mapping[Split, int],
+    seed: int,
+    lags: Lags = (),
+    cooling: Cooling = Cooling.LINEAR,
+) -> dict[Split, dict[Kind, Samples]]:
+    """Several splits as simulated_split gives each, with `counts` profiles of each kind."""
+    rngs = [np.random.default_rng([seed, _SPLITS.index(split)]) for split in counts]
+    data: dict[Split, dict[Kind, Samples]] = {split: {} for split in counts}
+    for kind in KINDS:
+        sets = [draw_profiles(preset, kind, n, rng) for n, rng in zip(counts.values(), rngs)]
+        for split, samples in zip(counts, simulate_sets(preset, sets, rngs, lags, cooling)):
+            data[split][kind] = samples
+    return data
 
 
 def training_rows(rows: int) -> int:

@@ -11,7 +11,8 @@ fast thermal mode (5 s) ahead there, and no map of the four inputs at one instan
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import Literal
 
 import numpy as np
@@ -81,6 +82,14 @@ def draw_profiles(preset: Preset, kind: Kind, count: int, rng: np.random.Generat
         _between(shares[:, 3], 0.0, MAX_INITIAL_SOC),
         core_limit_K,
     )
+
+
+def joined_profiles(sets: Sequence[Profiles]) -> Profiles:
+    """Profiles of one kind and length, all in one."""
+    first = sets[0]
+    columns = [field.name for field in fields(Profiles) if field.name != "kind"]
+    arrays = {name: np.concatenate([getattr(one, name) for one in sets]) for name in columns}
+    return Profiles(first.kind, **arrays)
 
 
 def start_range_K(preset: Preset) -> tuple[float, float]:

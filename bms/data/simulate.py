@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bms.arrays import Array, IntArray
+from bms.arrays import Array, IntArray, Mask
 from bms.cell import CellParameters, CellState, Disturbance, integrate_step
 from bms.data.cooling import Cooling
 from bms.data.lags import Lags, at_rest, step
-from bms.data.profiles import SAMPLE_PERIOD_S, Profiles
+from bms.data.profiles import SAMPLE_PERIOD_S, Profiles, joined_profiles
 from bms.presets import Preset
 
 PROCESS_NOISE_K_PER_S = 5e-4
@@ -32,7 +32,7 @@ class Samples:
     profile: IntArray
     time_s: Array
 
-    def rows(self, rows: slice) -> Samples:
+    def rows(self, rows: slice | Mask) -> Samples:
         """Some of the samples."""
         return Samples(
             self.inputs[rows],
@@ -40,6 +40,10 @@ class Samples:
             self.profile[rows],
             self.time_s[rows],
         )
+
+    def renumbered(self, first: int) -> Samples:
+        """The same with profile numbers that count from `first`."""
+        return replace(self, profile=self.profile - first)
 
 
 def joined(parts: Iterable[Samples]) -> Samples:
@@ -67,6 +71,24 @@ def simulate(
     5e-4 N(0, 1) K/s (paper, section "Estimating core temperature using KAN"). Lagged inputs follow
     the four, with filters that begin at rest.
     """
+    return simulate_sets(preset, [profiles], [rng], lags, cooling)[0]
+
+
+def simulate_sets(
+    preset: Preset,
+    sets: Sequence[Profiles],
+    rngs: Sequence[np.random.Generator],
+    lags: Lags = (),
+    cooling: Cooling = Cooling.LINEAR,
+) -> list[Samples]:
+    """Samples of several sets of profiles of one length, as `simulate` gives them of each.
+
+    All cells go through the same steps at once, and each set draws its noise by itself.
+    """
+    profiles = joined_profiles(sets)
+    sizes = [len(one.initial_soc) for one in sets]
+    ends = np.cumsum(sizes)
+    sources = list(zip(rngs, sizes, ends))
     cell, box = preset.cell, preset.operating_box
     start_K = profiles.initial_temperature_K
     state = CellState(profiles.initial_soc, start_K, start_K, start_K)
@@ -92,7 +114,11 @@ def simulate(
         cores.append(state.core_temperature_K[alive])
         numbers.append(np.flatnonzero(alive))
         times_s.append(np.full(np.count_nonzero(alive), number * SAMPLE_PERIOD_S))
-        noise = PROCESS_NOISE_K_PER_S * rng.standard_normal((3, len(start_K)))
+        noise = np.zeros((3, len(start_K)))
+        for rng, size, end in sources:
+            own = slice(end - size, end)
+            if alive[own].any():
+                noise[:, own] = PROCESS_NOISE_K_PER_S * rng.standard_normal((3, size))
         for _ in range(_STEPS_PER_SAMPLE):
             before_K = state.surface_temperature_K
             excess_W = cooling.excess_W(cell, state)
@@ -112,7 +138,12 @@ def simulate(
             filtered = step(
                 lags, filtered, _STEP_S, current_A, state.surface_temperature_K - before_K
             )
-    return Samples(*(np.concatenate(part) for part in (rows, cores, numbers, times_s)))
+    samples = Samples(*(np.concatenate(part) for part in (rows, cores, numbers, times_s)))
+    owner = np.searchsorted(ends, samples.profile, side="right")
+    return [
+        samples.rows(owner == number).renumbered(end - size)
+        for number, (_, size, end) in enumerate(sources)
+    ]
 
 
 def _derated_current_A(cell: CellParameters, state: CellState, core_limit_K: Array) -> Array:

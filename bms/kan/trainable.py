@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from bms.arrays import Array
-from bms.kan.basis import basis_with_slope, silu, silu_slope
+from bms.arrays import Array, Mask
+from bms.kan.basis import basis, basis_slope, silu, silu_slope
 from bms.kan.network import Edge, Layer
 
 
@@ -65,27 +66,37 @@ class TrainableLayer:
 class Expansion:
     """Base function (in, N) and B-splines (in, G + degree, N) of a layer's inputs, with slopes.
 
-    Where an input was clamped to its grid the slopes are 0.
+    Where an input was clamped to its grid the slopes are 0. They are computed when they are asked
+    for, which a first layer's seldom are.
     """
 
     base: Array
-    base_slope: Array
     splines: Array
-    spline_slopes: Array
+    _layer: TrainableLayer
+    _clamped: Array
+    _is_inside: Mask
+
+    @cached_property
+    def base_slope(self) -> Array:
+        """Derivative of the base function, (in, N)."""
+        return silu_slope(self._clamped) * self._is_inside
+
+    @cached_property
+    def spline_slopes(self) -> Array:
+        """Derivatives of the B-splines, (in, G + degree, N)."""
+        degree, rows = self._layer.degree, zip(self._clamped, self._layer.knots)
+        slopes = np.stack([basis_slope(row, knots, degree) for row, knots in rows])
+        slopes *= self._is_inside[:, None]
+        return slopes
 
 
 def expand(layer: TrainableLayer, x: Array) -> Expansion:
     """Functions of the inputs x (in, N) that do not depend on the trained parameters."""
     low, high = layer.knots[:, [layer.degree]], layer.knots[:, [-layer.degree - 1]]
     clamped = np.clip(x, low, high)
-    inside = (x == clamped).astype(np.float64)
-    pairs = [basis_with_slope(row, knots, layer.degree) for row, knots in zip(clamped, layer.knots)]
-    return Expansion(
-        silu(clamped),
-        silu_slope(clamped) * inside,
-        np.stack([values for values, _ in pairs]),
-        np.stack([slopes for _, slopes in pairs]) * inside[:, None],
-    )
+    pairs = zip(clamped, layer.knots)
+    values = np.stack([basis(row, knots, layer.degree) for row, knots in pairs])
+    return Expansion(silu(clamped), values, layer, clamped, x == clamped)
 
 
 def splines(layer: TrainableLayer, expansion: Expansion) -> Array:

@@ -16,7 +16,7 @@ from bms.bounds.derive import (
     error_bound_parts_K,
 )
 from bms.bounds.record import ErrorBounds
-from bms.data.datasets import PROFILES_OF_EACH_KIND, Split, simulated_split, split_by_time
+from bms.data.datasets import PROFILES_OF_EACH_KIND, Split, simulated_splits, split_by_time
 from bms.data.measurements import read_measurements, recording_sha256
 from bms.data.simulate import Samples, joined
 from bms.errors import InputError
@@ -50,10 +50,8 @@ def model_for_preset(
     Raises InputError when the width does not fit the inputs, or the profiles are too few.
     """
     splits: tuple[Split, ...] = ("training", "validation", "test")
-    data = {
-        split: simulated_split(preset, split, settings.seed, counts[split], settings.lags)
-        for split in splits
-    }
+    wanted = {split: counts[split] for split in splits}
+    data = simulated_splits(preset, wanted, settings.seed, settings.lags)
     samples = {split: joined(kinds.values()) for split, kinds in data.items()}
     network = network_for_preset(
         preset,

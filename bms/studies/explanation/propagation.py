@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bms.arrays import Array
-from bms.kan.basis import basis_with_slope, silu_slope
+from bms.kan.basis import basis_slope, silu_slope
 from bms.kan.network import Edge, Network
 
 
@@ -41,7 +41,7 @@ def edge_slope(edge: Edge, x: Array, degree: int) -> Array:
     """Derivative of the edge function at x (N,); 0 beyond the grid, where it keeps its value."""
     low, high = edge.knots[degree], edge.knots[-degree - 1]
     clamped = np.clip(x, low, high)
-    slopes = basis_with_slope(clamped, np.asarray(edge.knots), degree)[1]
+    slopes = basis_slope(clamped, np.asarray(edge.knots), degree)
     spline = np.asarray(edge.coefficients) @ slopes
     slope = edge.base_weight * silu_slope(clamped) + edge.spline_weight * spline
     inside = (x >= low) & (x <= high)
