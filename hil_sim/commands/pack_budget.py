@@ -37,8 +37,9 @@ def pack_budget(
     Example: bms pack-budget --cells 96 --bit-rate 500000
     """
     need = budget(cells, -(-cells // per_thermistor))
-    require_fit(need, bit_rate, share)
+    require_fit(need, bit_rate, share, per_thermistor)
     rates = sorted({*BIT_RATES, bit_rate})
+    most = {rate: most_cells(rate, share, per_thermistor) for rate in rates}
     if as_json:
         content = {
             "cells": need.cells,
@@ -47,7 +48,7 @@ def pack_budget(
             "frames": need.frames,
             "bits": need.bits,
             "load": {str(rate): need.load(rate) for rate in rates},
-            "most_cells": {str(rate): most_cells(rate, share) for rate in rates},
+            "most_cells": {str(rate): count for rate, count in most.items()},
         }
         print(json.dumps(content, indent=2))
         return EXIT_DONE
@@ -57,6 +58,6 @@ def pack_budget(
     )  # fmt: skip
     for rate in rates:
         load = f"{100.0 * need.load(rate):.1f}"
-        table.add_row(f"{rate / 1000:g}", load, str(most_cells(rate, share)))
+        table.add_row(f"{rate / 1000:g}", load, str(most[rate]))
     table.print(Console())
     return EXIT_DONE

@@ -55,12 +55,15 @@ def budget(cells: int, thermistors: int | None = None) -> Budget:
     return Budget(cells, count, len(lengths), sum(map(most_bits, lengths)), _period_ms())
 
 
-def require_fit(need: Budget, bit_rate: int, share: float = 1.0) -> None:
-    """Raise InputError, which says what would fit, for a period that is too long for its bus."""
+def require_fit(need: Budget, bit_rate: int, share: float = 1.0, per_thermistor: int = 1) -> None:
+    """Raise InputError for a period that is too long for its bus.
+
+    It says what would fit, with as many cells for each thermistor.
+    """
     if need.load(bit_rate) <= share:
         return
     fitting = [rate for rate in BIT_RATES if need.load(rate) <= share]
-    most = most_cells(bit_rate, share)
+    most = most_cells(bit_rate, share, per_thermistor)
     remedies = [f"take {most} cells at most"] if most else []
     if fitting:
         remedies.append(f"a bus of {fitting[0] // 1000} kbit/s")
@@ -72,9 +75,10 @@ def require_fit(need: Budget, bit_rate: int, share: float = 1.0) -> None:
     )
 
 
-def most_cells(bit_rate: int, share: float = 1.0) -> int:
-    """Most cells, with a thermistor each, whose period fits."""
-    fits = [n for n in range(1, MOST_CELLS + 1) if budget(n).load(bit_rate) <= share]
+def most_cells(bit_rate: int, share: float = 1.0, per_thermistor: int = 1) -> int:
+    """Most cells, with a thermistor for each so many, whose period fits."""
+    numbers = range(1, MOST_CELLS + 1)
+    fits = [n for n in numbers if budget(n, -(-n // per_thermistor)).load(bit_rate) <= share]
     return max(fits, default=0)
 
 

@@ -97,6 +97,19 @@ def test_fewer_thermistors_take_fewer_frames():
     assert budget(96, 12).frames == budget(96).frames - 28
 
 
+def test_the_command_says_how_many_cells_fit_with_as_few_thermistors():
+    asked = [BMS, "pack-budget", "--per-thermistor", "2", "--bit-rate", "125000", "--json"]
+    done = subprocess.run([*asked, "--cells", "120"], capture_output=True, text=True, check=True)
+    most = json.loads(done.stdout)["most_cells"]["125000"]
+    assert budget(most, -(-most // 2)).load(125_000) <= 1.0
+    assert budget(most + 1, -(-(most + 1) // 2)).load(125_000) > 1.0
+    refused = subprocess.run(
+        [*asked, "--cells", str(most + 1)], capture_output=True, text=True, check=False
+    )
+    assert refused.returncode == 2
+    assert f"take {most} cells at most" in refused.stderr
+
+
 def test_there_is_no_budget_for_more_cells_than_the_database_has():
     assert lib.BMS_MAX_CELLS == 192
     with pytest.raises(InputError, match="1 to 192"):
