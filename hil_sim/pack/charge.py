@@ -12,6 +12,7 @@ from typing import Any
 from bms.errors import BusError, ModelMismatchError
 from hil_sim.bus.buses import open_bus, require_room_for_ecu, require_shared
 from hil_sim.bus.catalog import ActiveConstraint, CommandState, FirstFault
+from hil_sim.bus.frame import Frame
 from hil_sim.logs.recorder import Recorder
 from hil_sim.nodes.ecu import EcuNode
 from hil_sim.nodes.plant import Delivery
@@ -107,6 +108,12 @@ def charge_pack_elsewhere(
         return _Run(settings, node, lambda measured: None, progress).run()
 
 
+def _of_others(heard: list[Frame], published: list[Frame]) -> int:
+    """Frames that are not this party's own, which some buses hand back to it."""
+    own = {frame.frame_id for frame in published}
+    return sum(frame.frame_id not in own for frame in heard)
+
+
 class _Run:
     def __init__(
         self,
@@ -133,7 +140,7 @@ class _Run:
             published = wire.publish(result.edge is not None)
             answer = self._node.exchange(result.steps, published)
             heard = wire.hear(answer)
-            result.frames += len(published) + len(answer)
+            result.frames += len(published) + _of_others(answer, published)
             self._note(heard)
             result.steps += 1
             result.reason = self._stop_reason(heard)
@@ -159,7 +166,7 @@ class _Run:
             return
         since = result.steps - result.edge
         result.charge_periods = since
-        if heard.governing_cell != 0:
+        if is_said and heard.governing_cell != 0:
             cell = int(heard.governing_cell)
             result.governed[cell] = result.governed.get(cell, 0) + 1
             name = ActiveConstraint(heard.constraint).label
@@ -168,7 +175,7 @@ class _Run:
             result.sample_s.append(since * self._settings.preset.timing.sampling_period_s)
             result.current_A.append(self._plant.current_A)
             result.core_K.append(self._plant.core_K())
-            result.governor.append(int(heard.governing_cell))
+            result.governor.append(int(heard.governing_cell) if is_said else 0)
             self._progress(max(self._plant.socs()))
 
     def _prepare(self, heard: Any) -> None:

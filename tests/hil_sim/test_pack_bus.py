@@ -14,8 +14,10 @@ from codegen.can_database import PACK, data_ids, load_database
 from hil_sim.logs import read_log
 from hil_sim.logs.recorder import Recorder
 from hil_sim.pack.charge import OFF_PERIODS, charge_pack
+from hil_sim.pack.node import PackPlantNode
 from hil_sim.pack.settings import PACK_VOLTAGE_STEP_V, PackChargeSettings, spread_of
 from hil_sim.pack.spread_kind import SpreadKind
+from hil_sim.run.result import STOP_SILENT
 from hil_sim.studies.pack._pack import ffi, lib
 from hil_sim.studies.pack.engine import BLOCK_PERIODS, PackCharge
 from hil_sim.studies.pack.spread import draw_pack
@@ -220,3 +222,34 @@ def test_equal_cells_stay_equal_and_each_has_its_estimate_on_the_bus(tmp_path):
     assert max(cores) - min(cores) < 0.5
     assert max(socs) - min(socs) < 0.001
     assert min(socs) > 0.1
+
+
+def test_a_cell_governs_only_in_periods_in_which_the_ecu_said_so():
+    """An ECU that falls silent in mid-charge says nothing any more; what it said last is past."""
+    periods = {"now": 0, "heard": 1500}
+
+    def silenced(frames):
+        periods["now"] += 1
+        return frames if periods["now"] <= periods["heard"] else []
+
+    settings = settings_of(6, answer_timeout_s=0.01)
+    silent = charge_pack(settings, sent=silenced)
+    assert silent.reason == STOP_SILENT
+    assert silent.commands_A[-5:] == [None] * 5
+    heard_s = (periods["heard"] - OFF_PERIODS) * PRESET.timing.sampling_period_s
+    other = charge_pack(settings_of(6, max_time_s=heard_s))
+    assert other.commands_A == silent.commands_A[:-5]
+    assert sum(silent.governed.values()) == sum(other.governed.values()) > 0
+
+
+def test_frames_that_a_bus_hands_back_to_the_plant_are_counted_once(monkeypatch):
+    """udp_multicast does so."""
+    plain = charge_pack(settings_of(max_time_s=3.0))
+    exchange = PackPlantNode.exchange
+    monkeypatch.setattr(
+        PackPlantNode,
+        "exchange",
+        lambda node, period, published: [*published, *exchange(node, period, published)],
+    )
+    echoed = charge_pack(settings_of(max_time_s=3.0))
+    assert (echoed.commands_A, echoed.frames) == (plain.commands_A, plain.frames)
