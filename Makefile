@@ -100,8 +100,13 @@ long-checks: .venv/tests build/extensions ## What takes too long for make test (
 	$(BIN)/python tools/long_checks.py $(CHECKS)
 
 ifdef TARGET
-fuzz: .venv/tests .venv/gates build/extensions ## 10^7 damaged frames, 10^6 damaged logs (SEED=n for others); or libFuzzer: TARGET=session|clock|slcan|image|calibration SECONDS=60
+fuzz: .venv/tests .venv/gates build/extensions ## 10^7 damaged frames, 10^6 damaged logs (SEED=n for others); or libFuzzer: TARGET=session|clock|slcan|image|calibration|logs SECONDS=60
+ifeq ($(TARGET),logs)
+	mkdir -p build/fuzz
+	cd build/fuzz && PYTHONPATH=$(CURDIR) $(CURDIR)/$(BIN)/python -m tests.hil_sim.log_target logs -max_total_time=$(or $(SECONDS),60) -seed=$(or $(SEED),1) -print_final_stats=1
+else
 	$(BIN)/python -m tests.firmware.fuzz.run $(TARGET) $(or $(SECONDS),60) $(or $(SEED),1)
+endif
 else
 fuzz: fuzz-frames fuzz-logs
 endif
