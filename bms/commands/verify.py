@@ -1,16 +1,16 @@
-"""`bms verify`: a machine-checked argument that decisions keep the barriers."""
+"""`bms verify` of one cell: a machine-checked argument that decisions keep the barriers."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
-from bms.commands import options
 from bms.commands.family_tables import print_family
 from bms.errors import InputError
 from bms.model.model_file import KanModel
@@ -35,30 +35,26 @@ from bms.verification.findings import Finding
 from bms.verification.search import CounterExample
 from bms.waiting import waiting
 
+FormulasOption = Annotated[
+    Formulas, typer.Option("--formulas", help="paper: with the slips of the printed formulas.")
+]
+SlipsOption = Annotated[
+    bool, typer.Option("--slips", help="Also charge with each slip and show what it costs.")
+]
+BoxesOption = Annotated[
+    int, typer.Option("--boxes", min=1, help="Boxes after which a barrier is given up.")
+]
+
 
 def verify(
-    preset: options.PresetOption = DEFAULT_PRESET,
-    model: options.ModelOption = None,
-    formulas: Annotated[
-        Formulas, typer.Option("--formulas", help="paper: with the slips of the printed formulas.")
-    ] = Formulas.CORRECTED,
-    slips: Annotated[
-        bool, typer.Option("--slips", help="Also charge with each slip and show what it costs.")
-    ] = False,
-    boxes: Annotated[
-        int, typer.Option("--boxes", min=1, help="Boxes after which a barrier is given up.")
-    ] = LARGEST_BOXES,
-    as_json: options.JsonOption = False,
+    preset: str = DEFAULT_PRESET,
+    model: Path | None = None,
+    formulas: Formulas = Formulas.CORRECTED,
+    slips: bool = False,
+    boxes: int = LARGEST_BOXES,
+    as_json: bool = False,
 ) -> int:
-    """Certify that no decision lets a limit be crossed before the next decision acts.
-
-    Branch and bound in interval arithmetic over all states (K), currents (A) and cooling (W), with
-    all disturbances, reading errors and estimation errors at their bounds. Exit code 1 when a
-    barrier cannot be certified, with the reason, the state and what to change; a counter-example is
-    a state that fails in simulation.
-
-    Example: bms verify --preset lin2014 --json
-    """
+    """What `bms verify` does for one cell; the exit code."""
     pair = load_pair(preset, model)
     if pair[0].cell.interval is not None:
         if slips or formulas is not Formulas.CORRECTED:

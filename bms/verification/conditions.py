@@ -7,12 +7,13 @@ calibration block, rounded to float32 where it is, or from a block with slips pu
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
 from bms.barrier import barrier_constants
 from bms.barrier.machinery import check_gains
+from bms.calibration import NO_CHANGES
 from bms.cell import OpenCircuitVoltage
 from bms.firmware.calibration import calibration_block
 from bms.model.model_file import KanModel
@@ -74,6 +75,19 @@ class Condition:
             self.reserve - other.reserve - shift,
         )
 
+    def times(self, factor: float) -> Condition:
+        """The same condition in another unit: all but limit and error term times a factor."""
+        return replace(
+            self,
+            core_gap=factor * self.core_gap,
+            coolant_gap=factor * self.coolant_gap,
+            room=factor * self.room,
+            coupling=factor * self.coupling,
+            squared=factor * self.squared,
+            cooling=factor * self.cooling,
+            reserve=factor * self.reserve,
+        )
+
     def branches(self) -> tuple[tuple[float, float], ...]:
         """Terms (constant, per ampere), the smallest of which is the error term at any current."""
         p, q, e = self.core_gap, self.coupling, self.error_bound_K
@@ -112,9 +126,14 @@ def required_conditions(preset: Preset) -> tuple[Condition, Condition]:
     return core, surface
 
 
-def firmware_constants(preset: Preset, model: KanModel) -> dict[str, Any]:
-    """What the firmware decides by, read back from its calibration block: scalars and table."""
-    calibration = calibration_block(preset, model, compiled_in=False)
+def firmware_constants(
+    preset: Preset, model: KanModel, changes: Mapping[str, float] = NO_CHANGES
+) -> dict[str, Any]:
+    """What the firmware decides by, read back from its calibration block: scalars and table.
+
+    `changes` as in bms.calibration.calibration_fields.
+    """
+    calibration = calibration_block(preset, model, compiled_in=False, changes=changes)
     block = calibration.rcbf
     names = [name for name in dir(block) if not name.startswith("ocv_")]
     limits = ("max_core_temperature_K", "max_surface_temperature_K")

@@ -24,6 +24,7 @@ from bms.presets import DEFAULT_PRESET
 from bms.text_table import TextTable
 from bms.waiting import waiting
 from hil_sim.commands import options
+from hil_sim.commands.pack_options import FlowOption, NeighbourOption
 from hil_sim.report.folder import OutputFolder
 from hil_sim.run.workforce import local_workforce
 from hil_sim.studies.pack.settings import PackSettings
@@ -35,22 +36,8 @@ from hil_sim.studies.pack.summary import claim_holds, summarise
 def pack(
     cells: Annotated[int, typer.Option("--cells", min=1, help="Cells in series.")] = 16,
     packs: Annotated[int, typer.Option("--packs", min=1, help="Number of packs to charge.")] = 1000,
-    neighbour_W_per_K: Annotated[
-        float,
-        typer.Option(
-            "--neighbour-w-per-k",
-            min=0.0,
-            help="Heat conduction between the surfaces of two neighbours.",
-        ),
-    ] = Surroundings.neighbour_W_per_K,
-    flow_W_per_K: Annotated[
-        float,
-        typer.Option(
-            "--flow-w-per-k",
-            min=0.1,
-            help="Heat capacity of the coolant that passes in a second; it warms along the string.",
-        ),
-    ] = Surroundings.flow_W_per_K,
+    neighbour_W_per_K: NeighbourOption = Surroundings.neighbour_W_per_K,
+    flow_W_per_K: FlowOption = Surroundings.flow_W_per_K,
     preset: PresetOption = DEFAULT_PRESET,
     model: ModelOption = None,
     seed: Annotated[int, seed_option("cells, disturbances and sensor noise")] = 0,

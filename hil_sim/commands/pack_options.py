@@ -24,6 +24,22 @@ PerThermistorOption = Annotated[
     int,
     typer.Option("--per-thermistor", min=1, help="Cells for each thermistor; with --cells."),
 ]
+NeighbourOption = Annotated[
+    float,
+    typer.Option(
+        "--neighbour-w-per-k",
+        min=0.0,
+        help="Heat conduction between the surfaces of two neighbours of a pack.",
+    ),
+]
+FlowOption = Annotated[
+    float,
+    typer.Option(
+        "--flow-w-per-k",
+        min=0.1,
+        help="Heat capacity of the coolant that passes in a second; it warms along the string.",
+    ),
+]
 
 
 def refuse_options(given: Mapping[str, bool]) -> None:

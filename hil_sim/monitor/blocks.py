@@ -16,7 +16,7 @@ from hil_sim.bus.catalog import (
     ReportedState,
 )
 from hil_sim.monitor import wording
-from hil_sim.monitor.model import MOST_COUNTED, ReceiverReport, Snapshot
+from hil_sim.monitor.model import MOST_COUNTED, Reading, ReceiverReport, Snapshot
 from hil_sim.monitor.presets import PresetInForce
 from hil_sim.monitor.traffic import MessageTraffic
 
@@ -37,10 +37,7 @@ _SELDOM = (*get_args(OptionalName), Message.PLAN, Message.START, Message.BOOT_RE
 def header(snapshot: Snapshot, bus: str) -> Table:
     """State, bus, what sets the pace, and how to leave."""
     reading = snapshot.readings["DiagnosticState"]
-    style = _OTHER_STATE_STYLE
-    if not reading.is_stale:
-        style = _STATE_STYLES.get(reading.value, _OTHER_STATE_STYLE)
-    left = Text(f" {wording.state(snapshot)} ", f"bold {style}")
+    left = Text(f" {wording.state(snapshot)} ", f"bold {state_style(reading)}")
     if reading.is_stale:
         left.append(" stale ", _WRONG)
     table = Table.grid(padding=(0, 2, 0, 0), expand=True)
@@ -49,6 +46,13 @@ def header(snapshot: Snapshot, bus: str) -> Table:
     table.add_column(no_wrap=True)
     table.add_row(left, Text.assemble(f"{bus}  ", _pace(snapshot)), Text("q quits", "dim"))
     return table
+
+
+def state_style(reading: Reading) -> str:
+    """Colours of an ECU's state."""
+    if reading.is_stale:
+        return _OTHER_STATE_STYLE
+    return _STATE_STYLES.get(reading.value, _OTHER_STATE_STYLE)
 
 
 def _pace(snapshot: Snapshot) -> Text:

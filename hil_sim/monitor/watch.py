@@ -3,20 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol, TypeVar
 
+from hil_sim.bus.buses import Frame
+from hil_sim.bus.foreign import ForeignFrame
 from hil_sim.monitor.listener import Listener
-from hil_sim.monitor.model import Snapshot, SystemModel
 from hil_sim.nodes.clock import Clock
+
+Known = TypeVar("Known")
+Known_co = TypeVar("Known_co", covariant=True)
+
+
+class Model(Protocol[Known_co]):
+    """Takes frames with the times at which they came, and says what is known at a time."""
+
+    def take(self, time_s: float, frame: Frame | ForeignFrame) -> None:
+        """Count a frame and keep what it says."""
+        ...
+
+    def snapshot(self, now_s: float) -> Known_co:
+        """What is known at a time in s."""
+        ...
 
 
 def watch(
     listener: Listener,
-    model: SystemModel,
+    model: Model[Known],
     clock: Clock,
     refresh_s: float,
     end_s: float,
     is_over: Callable[[], bool],
-    show: Callable[[Snapshot], None],
+    show: Callable[[Known], None],
 ) -> None:
     """Show a snapshot at once, after each refresh_s, and at end_s; BusError when the bus fails.
 

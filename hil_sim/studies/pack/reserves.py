@@ -14,6 +14,12 @@ from bms.bus_signals import BUS
 from bms.cell import CellFactors, CellParameters, scaled
 from bms.errors import InputError
 from bms.presets import Preset
+from hil_sim.studies.pack.coupling import (
+    coupling_K_per_s,
+    falling_K_per_s,
+    greatest_heat_W,
+    neighbour_gap_K,
+)
 from hil_sim.studies.pack.prediction import core_differences, surface_differences
 from hil_sim.studies.pack.spread import Spread, Surroundings
 
@@ -36,34 +42,6 @@ class Reserves:
 
 
 NO_RESERVES = Reserves({}, {})
-
-
-def greatest_heat_W(preset: Preset, spread: Spread) -> float:
-    """Heat of the cell with the greatest resistance at the strongest current, core at its limit."""
-    cell, limits = preset.cell, preset.limits
-    strength_A = -limits.reference_current_A
-    reversible_V = max(0.0, cell.entropic_coefficient_V_per_K) * limits.max_core_temperature_K
-    ohm = spread.resistance[1] * cell.ohmic_resistance_ohm
-    return (ohm * strength_A + reversible_V) * strength_A
-
-
-def neighbour_gap_K(preset: Preset, spread: Spread) -> float:
-    """Bound on the difference of two cells' surfaces in a steady state.
-
-    The one has the greatest heat and resistance to the coolant, the other the least of both. In a
-    transient it is less, since both begin at one temperature.
-    """
-    cell = preset.cell
-    most_W = greatest_heat_W(preset, spread)
-    least = spread.resistance[0] * spread.surface_resistance[0]
-    most = spread.resistance[1] * spread.surface_resistance[1]
-    return cell.surface_resistance_K_per_W * most_W * (most - least) / spread.resistance[1]
-
-
-def coupling_K_per_s(preset: Preset, spread: Spread, around: Surroundings) -> float:
-    """Bound on the rate at which two neighbours change a cell's surface temperature."""
-    gap_K = neighbour_gap_K(preset, spread)
-    return 2.0 * around.neighbour_W_per_K * gap_K / preset.cell.surface_heat_capacity_J_per_K
 
 
 def reserves(preset: Preset, spread: Spread, around: Surroundings) -> Reserves:
@@ -134,7 +112,7 @@ def _bare(preset: Preset, spread: Spread, around: Surroundings) -> dict[str, flo
     surface_K = (
         surface_prediction(cell, preset).error_bound_K
         + _neighbours_K(preset, spread, around)
-        + surface.falling_K_per_K_per_s * _falling_K_per_s(preset)
+        + surface.falling_K_per_K_per_s * falling_K_per_s(preset)
     )
     core_K = surface_K + (surface.above_K_per_W + core.above_K_per_W + core.below_K_per_W) * most_W
     strength_A = -preset.limits.reference_current_A
@@ -159,7 +137,7 @@ def _deficit_K(preset: Preset, spread: Spread, around: Surroundings) -> float:
     surface = surface_differences(preset, spread)
     return (
         surface.below_K_per_W * most_W
-        + surface.falling_K_per_K_per_s * _falling_K_per_s(preset)
+        + surface.falling_K_per_K_per_s * falling_K_per_s(preset)
         + preset.cell.surface_resistance_K_per_W * less_W
         + _neighbours_K(preset, spread, around)
     )
@@ -171,11 +149,5 @@ def _neighbours_K(preset: Preset, spread: Spread, around: Surroundings) -> float
     The coolant is taken to be uneven by all that one cell's heat makes of it.
     """
     slowest = preset.cell.surface_resistance_K_per_W * spread.surface_resistance[1]
-    neighbours_W = 2.0 * around.neighbour_W_per_K * neighbour_gap_K(preset, spread)
+    neighbours_W = 2.0 * around.neighbour_W_per_K * neighbour_gap_K(preset, spread, around)
     return slowest * neighbours_W + greatest_heat_W(preset, spread) / around.flow_W_per_K
-
-
-def _falling_K_per_s(preset: Preset) -> float:
-    """Rate at which the coolant of a cell falls at most."""
-    most_W = preset.operating_box.cooling_power_W[1]
-    return most_W / preset.cell.coolant_heat_capacity_J_per_K

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bms.bus_signals import BUS
-from hil_sim.studies.pack.reserves import coupling_K_per_s
+from hil_sim.studies.pack.coupling import coupling_K_per_s
 from hil_sim.studies.pack.settings import PackSettings
 from hil_sim.studies.pack.study import WEAKEST, Row
 
