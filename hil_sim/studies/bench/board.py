@@ -10,7 +10,7 @@ from bms.native_build import ROOT
 from bms.presets import load_preset
 from codegen.budgets.budgets import load_figures
 from codegen.budgets.measure import BOOT, CONTROL, CORE, IMAGE
-from hil_sim.studies.cost import measure_cost
+from hil_sim.studies.cost import CostReport, measure_cost
 from hil_sim.targets.catalog import built_folder
 
 _FIRMWARE = ROOT / "firmware_c"
@@ -63,9 +63,14 @@ def _board_cost(board: str, preset: str) -> BoardCost:
         )
     except InputError as error:
         return board_flash(board, str(error))
+    return counted_board(report)
+
+
+def counted_board(report: CostReport) -> BoardCost:
+    """Instructions of a report on a board, with the flash of the last accepted build."""
     costs = report.costs
     return replace(
-        board_flash(board),
+        board_flash(report.board),
         estimate_and_decision_worst=costs["estimate_and_decision"].charge_worst,
         period_median=costs["control_period"].charge_median,
     )

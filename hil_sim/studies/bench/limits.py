@@ -18,12 +18,16 @@ PLANNER, FAMILY, CALIBRATION = "planner", "family of cells", "calibration: model
 FUNCTIONS: Mapping[str, tuple[str, ...]] = {
     PLANNER: ("planner_", "bms_plan", "bms_has_planned", "end_prediction", "begin_inner"),
     "frames: checksums": ("e2e_",),
-    "frames: raw values and packing": ("codec_", "can_db_", "write_", "encode_", "bms_transmit"),
+    "frames: raw values and packing": (
+        *("codec_", "can_db_", "write_", "encode_", "queue_", "bms_transmit"),
+    ),
     "frames: reception": ("network_", "bms_receive", "request_", "pace_"),
-    "open-circuit voltage, the planner's too": ("rcbf_open_circuit", "numeric_"),
-    "decision": ("rcbf_", "narrow"),
+    "open-circuit voltage, the planner's too": ("rcbf_open_circuit", "look_up_voltage", "numeric_"),
+    "decision": ("rcbf_", "narrow", "decide", "steady"),
     "estimate": ("kan_", "history_", "clamp_to_reach"),
-    "states, symptoms, filters": ("bms_", "monitor_", "thermal_", "soc_"),
+    "states, symptoms, filters": (
+        *("bms_", "monitor_", "thermal_", "soc_", "run_period", "update_", "symptoms_", "outside_"),
+    ),
 }
 """Functions of the firmware by the beginnings of their names."""
 MODULES: Mapping[str, tuple[str, ...]] = {
@@ -104,6 +108,22 @@ def _campaign(aim: Aim, parts: CampaignParts) -> Breakdown:
         f"asked are {wanted_ms:.1f} ms for {parts.periods:,.0f} periods of three charges; the "
         f"firmware with its frames takes {firmware_ms:.1f} ms of them, all else "
         f"{parts.whole_ms - firmware_ms:.1f} ms",
+    )
+
+
+def period_breakdown(board: str, counts: Mapping[str, float], wanted: float) -> Breakdown:
+    """Mean instructions of a control period in mid-charge by what they are for."""
+    whole = sum(counts.values())
+    parts = parts_with_rest(whole, grouped(counts, FUNCTIONS))
+    frames = sum(value for name, value in parts.items() if name.startswith("frames"))
+    return Breakdown(
+        f"control period in mid-charge on {board}",
+        "instructions",
+        whole,
+        wanted,
+        parts,
+        f"mean of some periods without a search for a plan; frames with their protection take "
+        f"{frames:,.0f} of the {wanted:,.0f} asked for",
     )
 
 

@@ -52,10 +52,7 @@ def print_tables(console: Console, result: Result) -> None:
             console.print(f"not run: {cost.board}: {cost.not_run}", soft_wrap=True, markup=False)
     if result.board:
         _board(result).print(console)
-    _print_breakdowns(console, result)
-    reached = list(aims(result))
-    if reached:
-        _aims(result).print(console)
+    print_limits(console, result)
 
 
 def _ways(title: str, rows: list[Timed | Absent], c_ns: float | None) -> TextTable:
@@ -155,11 +152,14 @@ def _board(result: Result) -> TextTable:
     return table
 
 
-def _print_breakdowns(console: Console, result: Result) -> None:
+def print_limits(console: Console, result: Result) -> None:
+    """What the figures are made of, and the aims of all that was run."""
     if result.period_not_counted:
         console.print(f"not counted: {result.period_not_counted}", soft_wrap=True, markup=False)
     for breakdown in breakdowns(result):
         print_breakdown(console, breakdown)
+    if any(True for _ in aims(result)):
+        _aims(result).print(console)
 
 
 def print_breakdown(console: Console, breakdown: Breakdown) -> None:
