@@ -76,6 +76,8 @@ class VirtualBatchBus(VirtualBus):
             return [] if message is None else [heard_of(message)]
         self._check_if_open()
         queue: _BatchQueue = cast(Any, self.queue)
+        if timeout_s == 0.0 and queue.empty():
+            return []
         try:
             coming = [queue.get(timeout=timeout_s)]
             coming += [queue.get() for _ in range(queue.qsize())]

@@ -102,13 +102,13 @@ class CanBus(Closing):
             heard = self._hear(left_s)
             if not heard:
                 return None
-            for one in heard:
-                if isinstance(one, ForeignFrame):
-                    self.foreign[one] += 1
-                    late += left_s == 0.0
-                else:
-                    waiting.append(one)
-            if waiting:
+            frames = [one for one in heard if not isinstance(one, ForeignFrame)]
+            if len(frames) != len(heard):
+                foreign = [one for one in heard if isinstance(one, ForeignFrame)]
+                self.foreign.update(foreign)
+                late += len(foreign) if left_s == 0.0 else 0
+            if frames:
+                waiting.extend(frames)
                 return waiting.popleft()
         return None
 

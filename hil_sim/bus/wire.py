@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from hil_sim.bus.database import MessageCodec
-from hil_sim.bus.frame import Frame
+from hil_sim.bus.frame import Frame, frames_of
 from hil_sim.native._native import ffi, lib
 
 _FRAME = struct.Struct("=IB8s3x")
@@ -41,7 +41,7 @@ class Publisher:
         self._values[0 : self._ends[messages]] = [_NAN if v is None else v for v in values]
         lib.wire_send(self._wire, messages, self._values, self._frames)
         content = bytes(self._bytes[: messages * _FRAME.size])
-        return [Frame(i, data[:length]) for i, length, data in _FRAME.iter_unpack(content)]
+        return frames_of([(i, data[:length]) for i, length, data in _FRAME.iter_unpack(content)])
 
 
 class Listener:

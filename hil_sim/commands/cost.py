@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands.options import JsonOption, PresetOption, seed_option
@@ -17,7 +18,16 @@ from bms.presets import DEFAULT_PRESET, load_preset
 from bms.text_table import TextTable
 from bms.waiting import waiting
 from hil_sim.report.folder import OutputFolder
+from hil_sim.run.settings import Settings
+from hil_sim.studies.bench.aims import HARD_FLOAT, PERIOD_INSTRUCTIONS
+from hil_sim.studies.bench.board import counted_board
+from hil_sim.studies.bench.limits import period_breakdown
+from hil_sim.studies.bench.machine import this_machine
+from hil_sim.studies.bench.run import Result
+from hil_sim.studies.bench.tables import print_breakdown, print_limits
 from hil_sim.studies.cost import PARTS, CostReport, measure_cost
+from hil_sim.studies.cost.by_function import WITHOUT_PLANNER, instructions_by_function
+from hil_sim.studies.cost.charges import charge_records
 from hil_sim.studies.cost.chart import cost_chart
 from hil_sim.targets.catalog import BOARD_NAMES, board_name, built_folder
 
@@ -85,6 +95,8 @@ def cost(
         typer.echo(json.dumps([report.to_json() for report in reports], indent=1))
     else:
         _print(reports, charges, states)
+        if preset == DEFAULT_PRESET:
+            _print_limits(reports)
     worst = max(report.costs["estimate_and_decision"].worst for report in reports)
     if limit is not None and worst > limit:
         typer.echo(f"estimate and decision: {worst} instructions, allowed {limit}", err=True)
@@ -110,3 +122,15 @@ def _print(reports: list[CostReport], charges: int, states: int) -> None:
         f"least, median and worst over a whole charge; searched: {charges} beginnings of charges, "
         f"and {states} states a generation. Instructions, not cycles."
     )
+
+
+def _print_limits(reports: list[CostReport]) -> None:
+    """What a period and the flash are made of, and the aims of the default preset."""
+    console = Console()
+    if any(report.board == HARD_FLOAT for report in reports):
+        begin, count = WITHOUT_PLANNER
+        records = charge_records(Settings(load_preset(DEFAULT_PRESET))).records[: begin + count]
+        program = built_folder(HARD_FLOAT) / "cost.elf"
+        counts = instructions_by_function(program, HARD_FLOAT, records, count)
+        print_breakdown(console, period_breakdown(HARD_FLOAT, counts, PERIOD_INSTRUCTIONS))
+    print_limits(console, Result(this_machine(), board=list(map(counted_board, reports))))

@@ -13,6 +13,7 @@ import can
 from can.io.logger import MESSAGE_WRITERS
 
 from hil_sim.bus.closing import Closing
+from hil_sim.bus.limits import HIGHEST_STANDARD_ID
 from hil_sim.logs.formats import is_compressed, usable_format
 from hil_sim.logs.frame import LogFrame
 
@@ -30,6 +31,8 @@ class _CandumpLines:
     def __init__(self, file: Any) -> None:
         self._write = file.write
         self._first_s: float | None = None
+        self._time_s: float | None = None
+        self._begin = ""
 
     def write(
         self,
@@ -38,16 +41,24 @@ class _CandumpLines:
         received: bool,
         is_extended: bool = False,
     ) -> None:
-        time_s = round(time_s, 6)
+        if time_s != self._time_s:
+            self._time_s = time_s
+            self._begin = self._begin_of(round(time_s, 6))
+        begin, end = self._begin, _ENDS[received]
+        if is_extended:
+            lines = [f"{begin}{i:08X}#{data.hex().upper()}{end}" for i, data in frames]
+        else:
+            lines = [f"{begin}{_SHOWN[i]}{data.hex().upper()}{end}" for i, data in frames]
+        self._write("".join(lines))
+
+    def _begin_of(self, time_s: float) -> str:
         if self._first_s is None:
             self._first_s = time_s or 0.0
-        time_s = max(time_s, self._first_s)
-        begin, end = f"({time_s:f}) {CHANNEL} ", _ENDS[received]
-        shown = "%08X#" if is_extended else "%03X#"
-        self._write("".join([begin + shown % i + data.hex().upper() + end for i, data in frames]))
+        return f"({max(time_s, self._first_s):f}) {CHANNEL} "
 
 
 _ENDS = {True: " R\n", False: " T\n"}
+_SHOWN = [f"{frame_id:03X}#" for frame_id in range(HIGHEST_STANDARD_ID + 1)]
 
 
 class LogWriter(Closing):

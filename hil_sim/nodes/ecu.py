@@ -11,6 +11,7 @@ from typing import Protocol, runtime_checkable
 from hil_sim.bus.buses import CanBus, Frame
 from hil_sim.bus.catalog import FrameId
 from hil_sim.bus.deadline import Deadline
+from hil_sim.bus.frame import frames_of
 from hil_sim.nodes.clock import Clock
 from hil_sim.nodes.punctuality import DEADLINE_PERIODS, Slots
 
@@ -69,8 +70,12 @@ class EcuNode:
     def answer(self, timeout_s: float) -> bool:
         """Take in frames until a SYNC has been answered; False when timeout_s pass without."""
         frames = self._bus.gather(_SYNC_ID, _any, timeout_s, _MOST_FRAMES_A_PERIOD)
-        for frame in frames:
-            self._take(frame)
+        if self._batches is None or len(self._taken) + len(frames) >= _MOST_KEPT_FRAMES:
+            for frame in frames:
+                self._take(frame)
+        else:
+            self.frames += len(frames)
+            self._taken += frames
         if not frames or frames[-1].frame_id != _SYNC_ID:
             return False
         self._step()
@@ -148,7 +153,7 @@ class EcuNode:
             answers = self._batches.exchange(self._taken)
             self._taken.clear()
         self.steps += 1
-        self._bus.send(*[Frame(*answer) for answer in answers])
+        self._bus.send(*frames_of(answers))
 
     def _heard_measurement(self, poll_s: float, stopped: Callable[[], bool]) -> bool:
         while not stopped():

@@ -40,9 +40,9 @@ class LossWatch:
 
     def pass_on(self, frames: list[Frame]) -> list[Frame]:
         """The frames unchanged, after a look for a report of losses among them."""
-        for frame in frames:
-            if frame.frame_id == LOSS_ID and len(frame.data) == _COUNTS.size:
-                self.losses = LineLosses(*_COUNTS.unpack(frame.data))
+        for frame_id, data in frames:
+            if frame_id == LOSS_ID and len(data) == _COUNTS.size:
+                self.losses = LineLosses(*_COUNTS.unpack(data))
         return frames
 
     def hear_out(self, bus: CanBus) -> None:

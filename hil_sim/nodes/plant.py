@@ -85,10 +85,10 @@ class Answer:
 
     def value(self, signal: str) -> float | None:
         """Value of a signal in the database's unit."""
-        place = self._places.get(signal)
-        if place is None:
+        try:
+            value = self._values[self._places[signal]]
+        except KeyError:
             return None
-        value = self._values[place]
         return value if value == value else None  # noqa: PLR0124 (NaN)
 
     @property
@@ -175,9 +175,11 @@ class PlantNode:
         self._turn.begin()
         sent_s, heard = self._converse(period, frames)
         said = [frame for _, frame in heard]
-        self._is_answer_late = not any(map(self._is_last, said))
-        self._follow([frame for _, frame in late])
-        self._follow(said)
+        commands = self._commands_of(said)
+        self._is_answer_late = not any(map(self._is_last, commands))
+        if late:
+            self._follow(self._commands_of([frame for _, frame in late]))
+        self._follow(commands)
         if self._recorder is not None:
             self._record(late, received=True)
             self._recorder.record(sent_s, frames, received=False)
@@ -187,6 +189,9 @@ class PlantNode:
     def _record(self, stamped: list[StampedFrame], received: bool) -> None:
         """Frames of one time by one call; in virtual time those are all of a period."""
         assert self._recorder is not None
+        if stamped and stamped[0][0] == stamped[-1][0]:
+            self._recorder.record(stamped[0][0], [frame for _, frame in stamped], received)
+            return
         for time_s, group in groupby(stamped, _TIME):
             self._recorder.record(time_s, [frame for _, frame in group], received)
 
@@ -232,6 +237,10 @@ class PlantNode:
         """
         counter = self._command_counter(frame)
         return counter is not None and self._last_counter in (None, (counter - 1) % COUNTER_MODULUS)
+
+    def _commands_of(self, frames: list[Frame]) -> list[Frame]:
+        command_id = self._command_id
+        return [frame for frame in frames if frame[0] == command_id]
 
     def _follow(self, frames: list[Frame]) -> None:
         """Keep the counter of the last command.
@@ -282,9 +291,9 @@ class PlantNode:
 
     def _answer(self, heard: list[Frame]) -> Answer:
         values, command = self._listener.hear(heard), self._silent_command
-        for frame in heard:
-            if frame.frame_id == self._command_id and self._commands.check(frame.data):
-                command = self._command.values(frame.data)
+        for _, data in self._commands_of(heard):
+            if self._commands.check(data):
+                command = self._command.values(data)
         answer = Answer(values + command, self._places, None, None)
         answer.usable_command_A = self._commands.end_period(answer.command_A)
         self._faults.take(answer.value)

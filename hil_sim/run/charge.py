@@ -38,6 +38,8 @@ BOOT_STAGE_VERSION = 0
 
 Progress = Callable[[float], None]
 
+_COMPLETE, _FAULT = CommandState.COMPLETE.label, CommandState.FAULT.label
+
 
 @dataclass
 class Charge:
@@ -208,10 +210,12 @@ class Charge:
             return None
         if self.ends_early and self._silent_periods >= SILENT_PERIODS:
             return STOP_SILENT
-        if self.ends_early and answer.state == CommandState.COMPLETE.label:
-            return STOP_COMPLETE
-        if self.ends_early and answer.state == CommandState.FAULT.label:
-            return STOP_FAULT
+        if self.ends_early:
+            state = answer.state
+            if state == _COMPLETE:
+                return STOP_COMPLETE
+            if state == _FAULT:
+                return STOP_FAULT
         if (self.steps - self._edge) * self._period_s >= self.max_time_s:
             return STOP_TIME_LIMIT
         return None

@@ -14,6 +14,7 @@ from hil_sim.bus.buses import (
     require_room_for_ecu,
     require_shared,
 )
+from hil_sim.bus.frame import frames_of
 
 
 @pytest.fixture
@@ -31,6 +32,13 @@ def test_frames_arrive_whole_and_in_order(frames):
         assert [other.receive(1.0) for _ in frames] == frames
         assert other.receive(0.0) is None
         assert one.receive(0.0) is None
+
+
+@given(st.lists(st.tuples(st.integers(0, 0x7FF), st.binary(max_size=8)), max_size=20))
+def test_frames_of_pairs_are_frames_like_others(pairs):
+    made = frames_of(pairs)
+    assert made == [Frame(*pair) for pair in pairs]
+    assert all(type(frame) is Frame and frame.data == pair[1] for frame, pair in zip(made, pairs))
 
 
 @pytest.mark.parametrize(

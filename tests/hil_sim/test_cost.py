@@ -20,6 +20,7 @@ from bms.presets import load_preset
 from hil_sim.bus.buses import Frame
 from hil_sim.run.session import run_both
 from hil_sim.run.settings import Settings
+from hil_sim.studies.bench.limits import period_breakdown
 from hil_sim.studies.cost.by_function import instructions_by_function
 from hil_sim.studies.cost.charges import charge_records
 from hil_sim.studies.cost.counting import count
@@ -190,3 +191,30 @@ def test_records_hold_exactly_the_frames_of_a_period():
 def test_ticks_of_the_timer_become_instructions():
     ticks = b"".join(n.to_bytes(4, "little") for n in (10, 26, 10, 1610, 10))
     assert [values.tolist() for values in counts(ticks)] == [[10], [0], [1000], [0]]
+
+
+def test_the_command_prints_the_aims_and_what_a_period_is_made_of(
+    bms, program, tmp_path, monkeypatch
+):
+    """The groups of functions leave little, so that the reader can judge the whole."""
+    folder = tmp_path / "build" / "firmware" / "mps2_an386"
+    folder.mkdir(parents=True)
+    shutil.copy(program, folder)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    status, output, _ = bms("cost", "--target", f"qemu:{FPU}", "--charges", "1", "--states", "50")
+    assert status == 0
+    for aim in (
+        "estimate and decision, worst of a charge on mps2-an386",
+        "control period with frames, median on mps2-an386",
+        "flash of the application on mps2-an386",
+        "flash of the image on mps2-an386",
+    ):
+        assert aim in output
+    counts = instructions_by_function(
+        program, FPU, charge_records(Settings(load_preset("paper_calibrated"))).records[:182], 12
+    )
+    made = period_breakdown(FPU, counts, 4000.0)
+    assert made.total == pytest.approx(sum(counts.values()))
+    assert abs(made.parts["rest"]) < 0.05 * made.total
+    assert f"{made.total:,.0f}" in output

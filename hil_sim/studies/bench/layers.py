@@ -6,24 +6,40 @@ import signal
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from types import FrameType
+
+from hil_sim.studies.bench.breakdown import REST
 
 INTERVAL_S = 0.001
 
+BUS = "bus (python-can)"
 LAYERS: Mapping[str, tuple[str, ...]] = {
     "cell model": ("bms/cell/", "hil_sim/plant/plant.py", "hil_sim/plant/disturbances.py"),
-    "bus (python-can)": ("hil_sim/bus/buses.py", "hil_sim/bus/batches.py"),
-    "codec and protection of the plant": (
-        "hil_sim/bus/database.py",
-        "hil_sim/bus/wire.py",
-        "hil_sim/bus/e2e.py",
-        "hil_sim/nodes/plant.py",
+    BUS: ("hil_sim/bus/buses.py", "hil_sim/bus/batches.py", "hil_sim/bus/deadline.py"),
+    "measurements to protected frames": (
+        "wire.py:frames",
+        "wire.py:<listcomp>",
+        "plant.py:_frames",
     ),
-    "recording": ("hil_sim/logs/recorder.py", "hil_sim/logs/"),
-    "firmware and its node": ("bms/firmware/", "hil_sim/nodes/ecu.py"),
+    "answer: protection, values": (
+        "hil_sim/bus/wire.py",
+        "hil_sim/bus/database.py",
+        "hil_sim/bus/fault_bits.py",
+        "hil_sim/nodes/commands.py",
+        "bms/firmware/reception.py",
+        "plant.py:_answer",
+        "plant.py:value",
+    ),
+    "lock step of the plant's node": ("hil_sim/nodes/plant.py", "hil_sim/nodes/turns.py"),
+    "recording": ("hil_sim/logs/",),
+    "firmware": ("bms/firmware/",),
+    "firmware's node": ("hil_sim/nodes/ecu.py",),
     "sensors": ("hil_sim/plant/sensors.py",),
+    "time series": ("hil_sim/run/result.py",),
+    "charge: charger, request, end": ("hil_sim/run/charge.py", "hil_sim/plant/charger.py"),
 }
-REST = "rest"
+"""Ends of `file:function` or parts of the path, of which the first that fits counts."""
 
 
 class LayerCounts:
@@ -35,11 +51,10 @@ class LayerCounts:
     def note(self, frame: FrameType | None) -> None:
         """Count one sample of the stack for the innermost layer on it."""
         while frame is not None:
-            path = frame.f_code.co_filename.replace("\\", "/")
-            for layer, parts in LAYERS.items():
-                if any(part in path for part in parts):
-                    self._samples[layer] += 1
-                    return
+            layer = _layer_of(frame.f_code.co_filename, frame.f_code.co_name)
+            if layer is not None:
+                self._samples[layer] += 1
+                return
             frame = frame.f_back
         self._samples[REST] += 1
 
@@ -52,6 +67,15 @@ class LayerCounts:
         """Share of the time by layer, largest first."""
         total = sum(self._samples.values())
         return {name: 100.0 * n / total for name, n in self._samples.most_common()}
+
+
+@cache
+def _layer_of(file: str, function: str) -> str | None:
+    place = f"{file}:{function}".replace("\\", "/")
+    for layer, parts in LAYERS.items():
+        if any(part in place for part in parts):
+            return layer
+    return None
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from hil_sim.studies.bench.aims import aims
+from hil_sim.studies.bench.limits import breakdowns
 from hil_sim.studies.bench.race import Absent, Quartiles, Timed
 from hil_sim.studies.bench.run import Result
 from hil_sim.studies.bench.simulation import BusSpeed
@@ -29,6 +30,11 @@ def outcome_json(result: Result) -> dict[str, Any]:
             for row, relative in zip(result.campaign, growth(result.campaign))
         ],
         "board": [asdict(cost) for cost in result.board],
+        "breakdowns": [
+            {**asdict(one), "total": one.total, "is_enough": one.total <= one.wanted}
+            for one in breakdowns(result)
+        ],
+        "period_not_counted": result.period_not_counted,
         "aims": [{**asdict(aim), "is_reached": aim.is_reached} for aim in aims(result)],
     }
 

@@ -9,7 +9,10 @@ from dataclasses import dataclass, field
 from enum import Enum
 from importlib import import_module
 
+from bms.errors import InputError
 from hil_sim.studies.bench.board import BoardCost, board_costs
+from hil_sim.studies.bench.campaign_parts import CampaignParts, campaign_parts
+from hil_sim.studies.bench.counted import instructions_of_period
 from hil_sim.studies.bench.decision import (
     decision_from_python,
     decision_in_c,
@@ -50,10 +53,12 @@ class Effort:
     repetitions: int
     simulation_repetitions: int
     simulation_time_s: float
+    campaign_runs: int
+    """Of which the parts are timed."""
 
 
-FULL = Effort(11, 3, 3600.0)
-QUICK = Effort(3, 1, 20.0)
+FULL = Effort(11, 3, 3600.0, 100)
+QUICK = Effort(3, 1, 20.0, 3)
 
 
 @dataclass
@@ -68,8 +73,12 @@ class Result:
     perceptron: list[Timed | Absent] = field(default_factory=list)
     decision: list[Timed | Absent] = field(default_factory=list)
     period: list[Timed | Absent] = field(default_factory=list)
+    period_instructions: dict[str, float] = field(default_factory=dict)
+    """By function of the firmware; empty where they cannot be counted."""
+    period_not_counted: str = ""
     simulation: list[BusSpeed] = field(default_factory=list)
     campaign: list[Throughput] = field(default_factory=list)
+    campaign_parts: CampaignParts | None = None
     board: list[BoardCost] = field(default_factory=list)
 
 
@@ -80,7 +89,7 @@ def step_count(sections: set[Section], buses: list[str], campaign_runs: list[int
     if Section.SIMULATION in sections:
         steps += sum(len(processes_on(bus)) for bus in buses)
     steps += Section.BOARD in sections
-    return steps + (len(campaign_runs) if Section.CAMPAIGN in sections else 0)
+    return steps + (len(campaign_runs) + 1 if Section.CAMPAIGN in sections else 0)
 
 
 def run_benchmark(
@@ -113,6 +122,7 @@ def run_benchmark(
                 note("whole control period")
                 commands_A, peers = recorded_commands_A(problem), [control_periods(problem)]
                 result.period = race(commands_A, peers, effort.repetitions, clocks.cpu_ns)
+                _count_period(result, problem)
     repetitions, time_s = effort.simulation_repetitions, effort.simulation_time_s
     for bus in buses if Section.SIMULATION in sections else ():
         for processes in processes_on(bus):
@@ -122,6 +132,9 @@ def run_benchmark(
     for runs in campaign_runs if Section.CAMPAIGN in sections else ():
         note(f"campaign of {runs} runs")
         result.campaign.append(campaign_throughput(preset, runs, jobs, clocks.wall_ns))
+    if result.campaign:
+        note("parts of a campaign")
+        result.campaign_parts = campaign_parts(preset, effort.campaign_runs, clocks.cpu_ns)
     if Section.BOARD in sections:
         note("instructions on the boards")
         result.board = board_costs(preset)
@@ -145,6 +158,13 @@ def _estimate(result: Result, problem: Problem, repetitions: int, clock_ns: Cloc
             )
         )
     result.estimate = race(problem.core_temperature_K, peers, repetitions, clock_ns)
+
+
+def _count_period(result: Result, problem: Problem) -> None:
+    try:
+        result.period_instructions = instructions_of_period(problem)
+    except InputError as error:
+        result.period_not_counted = str(error)
 
 
 def _decision(result: Result, problem: Problem, repetitions: int, clock_ns: ClockNs) -> None:

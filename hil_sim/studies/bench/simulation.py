@@ -45,6 +45,7 @@ class BusSpeed:
     """Of one core, that the plant's process had; all of it is a run that nobody else disturbed."""
     layer_shares_percent: dict[str, float]
     not_run: str = ""
+    period_s: float = 0.1
 
 
 class _Pace:
@@ -114,6 +115,7 @@ def bus_speed(
         Quartiles.of(speeds),
         median(shares),
         layers.shares_percent,
+        period_s=settings.preset.timing.sampling_period_s,
     )
 
 

@@ -7,6 +7,8 @@ from rich.markup import escape
 
 from bms.text_table import TextTable, red
 from hil_sim.studies.bench.aims import aims
+from hil_sim.studies.bench.breakdown import Breakdown
+from hil_sim.studies.bench.limits import breakdowns
 from hil_sim.studies.bench.race import Absent, Timed
 from hil_sim.studies.bench.run import Result
 from hil_sim.studies.bench.throughput import growth
@@ -50,9 +52,7 @@ def print_tables(console: Console, result: Result) -> None:
             console.print(f"not run: {cost.board}: {cost.not_run}", soft_wrap=True, markup=False)
     if result.board:
         _board(result).print(console)
-    reached = list(aims(result))
-    if reached:
-        _aims(result).print(console)
+    print_limits(console, result)
 
 
 def _ways(title: str, rows: list[Timed | Absent], c_ns: float | None) -> TextTable:
@@ -150,6 +150,29 @@ def _board(result: Result) -> TextTable:
         )
         table.add_row(row.board, *("" if value is None else f"{value:,}" for value in figures))
     return table
+
+
+def print_limits(console: Console, result: Result) -> None:
+    """What the figures are made of, and the aims of all that was run."""
+    if result.period_not_counted:
+        console.print(f"not counted: {result.period_not_counted}", soft_wrap=True, markup=False)
+    for breakdown in breakdowns(result):
+        print_breakdown(console, breakdown)
+    if any(True for _ in aims(result)):
+        _aims(result).print(console)
+
+
+def print_breakdown(console: Console, breakdown: Breakdown) -> None:
+    """Its parts, their sum, and where the limit is."""
+    title = f"{breakdown.figure}: what it is made of"
+    table = TextTable(breakdown.unit, "", "%", title=title)
+    digits = 0 if breakdown.measured >= 1000 else 1
+    for name, value in breakdown.parts.items():
+        table.add_row(name, f"{value:,.{digits}f}", f"{100.0 * value / breakdown.measured:.0f}")
+    table.add_row("all", f"{breakdown.total:,.{digits}f}", "100")
+    table.add_row("asked", f"{breakdown.wanted:,.{digits}f}", "")
+    table.print(console)
+    console.print(f"{breakdown.limit}.", soft_wrap=True, markup=False)
 
 
 def _aims(result: Result) -> TextTable:

@@ -12,12 +12,13 @@ from pathlib import Path
 from bms.errors import InputError
 from bms.presets import load_preset
 from hil_sim.run.settings import Settings
-from hil_sim.studies.cost.by_function import instructions_by_function
+from hil_sim.studies.cost.by_function import (
+    SEARCHING,
+    WITHOUT_PLANNER,
+    instructions_by_function,
+)
 from hil_sim.studies.cost.charges import charge_records
 
-SEARCHING, WITHOUT_PLANNER = (20, 25), (170, 12)
-"""Periods from the ECU's start, and how many of the last of them are averaged: all of them search
-for a plan, or none of them does."""
 LEAST_SHARE = 0.01
 
 

@@ -15,6 +15,9 @@ from bms.errors import InputError
 from hil_sim.targets import Emulation
 
 TIMEOUT_S = 300.0
+SEARCHING, WITHOUT_PLANNER = (20, 25), (170, 12)
+"""Periods from the ECU's start, and how many of the last of them are averaged: all of them search
+for a plan, or none of them does."""
 _PERIOD = "whole_period"
 _NM = "arm-none-eabi-nm"
 _ADDRESS = re.compile(r"\[[0-9a-f]+/([0-9a-f]+)/")

@@ -10,7 +10,11 @@ from pathlib import Path
 from bms.native_build import FLAGS, ROOT, SANITIZERS
 
 HERE = Path(__file__).parent
-PARTS = {"fuzz": ("fuzz", "damage", "session"), "benchmark": ("benchmark", "session")}
+PARTS = {
+    "fuzz": ("fuzz", "damage", "session"),
+    "benchmark": ("benchmark", "session"),
+    "kernels": ("kernels", "plain_kernels"),
+}
 WARNINGS = ("-pedantic", "-Wall", "-Wextra", "-Werror")
 
 
