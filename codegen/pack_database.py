@@ -68,6 +68,7 @@ def pack_database() -> dict[str, str]:
         "PackElectrical", "PackCoolant", "PackRequest",
         *(f"{group.name}{m + 1}" for group in GROUPS for m in range(MESSAGES_A_GROUP)),
         "PackCommand", "PackEstimate", "PackDecision", "PackDiagnostics", "PackFaults",
+        "PackFunction", "PackSpread",
     ]  # fmt: skip
     taken = [data_ids(message) for message in load_database().messages if data_ids(message)]
     lists: dict[str, str] = {}

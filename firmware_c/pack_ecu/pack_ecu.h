@@ -16,6 +16,7 @@
 #include "pace.h"
 #include "pack.h"
 #include "pack_catalog.h"
+#include "pack_function.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -35,12 +36,16 @@ extern "C" {
 typedef struct {
     pack_config_t pack;
     float pack_voltage_error_V; /* of the sum of the cells' voltages against that of the pack */
+    pack_horizon_t now;         /* until the next command acts */
+    pack_horizon_t soon;        /* for 10 s */
 } pack_ecu_config_t;
 
 typedef struct {
     pack_t pack;
     uint32_t periods;
     float pack_voltage_error_V;
+    pack_horizon_t now;
+    pack_horizon_t soon;
     float current_A; /* what came last of each signal; NaN where its sender has no value */
     float pack_voltage_V;
     float coolant_in_K;
@@ -66,6 +71,8 @@ typedef struct {
     uint32_t latched_faults; /* of both, until the request goes off */
     uint8_t first_fault;
     float command_A;
+    float allowed_now_A; /* state of function */
+    float allowed_soon_A;
     uint8_t turn[PACK_ECU_SENT]; /* page that is next to be sent */
     uint8_t page_counter[PACK_ECU_SENT][(BMS_MAX_CELLS + 2) / 3];
     uint8_t counter[PACK_TRANSMITTED_COUNT];

@@ -83,6 +83,22 @@ static uint64_t identity_of(const pack_ecu_t *ecu)
            pack_with_code(PACK_SIGNAL_NETWORK_VERSION, PACK_NETWORK_VERSION);
 }
 
+static uint64_t function_of(const pack_ecu_t *ecu)
+{
+    return pack_with_value(PACK_SIGNAL_ALLOWED_CURRENT_NOW, ecu->allowed_now_A,
+                           CODEC_TOWARDS_ZERO) |
+           pack_with_value(PACK_SIGNAL_ALLOWED_CURRENT_FOR10S, ecu->allowed_soon_A,
+                           CODEC_TOWARDS_ZERO);
+}
+
+static uint64_t spread_of(const pack_ecu_t *ecu)
+{
+    const range_t none = { NAN, NAN };
+    const range_t spread = ecu->pack.soc_known ? pack_soc_spread(&ecu->pack) : none;
+    return pack_with_value(PACK_SIGNAL_HIGHEST_STATE_OF_CHARGE, spread.high, CODEC_NEAREST) |
+           pack_with_value(PACK_SIGNAL_LOWEST_STATE_OF_CHARGE, spread.low, CODEC_NEAREST);
+}
+
 static uint64_t content_of(const pack_ecu_t *ecu, uint32_t message)
 {
     switch (message) {
@@ -96,6 +112,10 @@ static uint64_t content_of(const pack_ecu_t *ecu, uint32_t message)
         return pack_with_code(PACK_SIGNAL_LATCHED_FAULTS, ecu->latched_faults);
     case PACK_TRANSMITTED_IDENTITY:
         return identity_of(ecu);
+    case PACK_TRANSMITTED_FUNCTION:
+        return function_of(ecu);
+    case PACK_TRANSMITTED_SPREAD:
+        return spread_of(ecu);
     default:
         return pack_with_value(PACK_SIGNAL_COMMAND_CURRENT, ecu->command_A, CODEC_TOWARDS_ZERO) |
                pack_with_code(PACK_SIGNAL_COMMAND_STATE, (uint32_t)state_of(ecu));

@@ -61,6 +61,8 @@ class PackResult:
     """Period in which the charge was asked for."""
     peaks: Any = None
     final_socs: list[float] = field(default_factory=list)
+    counted_soc: tuple[float, float] | None = None
+    """What the ECU counted last of the emptiest and the fullest cell."""
 
 
 def charge_pack(
@@ -152,6 +154,8 @@ class _Run:
         result.supplied_A.append(self._plant.current_A)
         result.active_faults.append(int(heard.active_faults))
         result.latched_faults = int(heard.latched_faults)
+        if not math.isnan(heard.highest_soc):
+            result.counted_soc = (float(heard.lowest_soc), float(heard.highest_soc))
         if heard.first_fault != FirstFault.NONE and result.first_fault == FirstFault.NONE:
             result.first_fault = int(heard.first_fault)
             result.faulty_cell = int(heard.faulty_cell)

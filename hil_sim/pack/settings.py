@@ -13,6 +13,7 @@ from bms.presets.schema import Sensor
 from hil_sim.pack.spread_kind import SpreadKind
 from hil_sim.studies.pack._pack import lib
 from hil_sim.studies.pack.engine import Core, View, all_cells
+from hil_sim.studies.pack.function import horizons
 from hil_sim.studies.pack.reserves import reserves
 from hil_sim.studies.pack.spread import Spread, Surroundings
 
@@ -64,6 +65,16 @@ class PackChargeSettings:
         """
         kept = _reserves(self.preset, spread_of(self.spread), self.around)
         return Core(self.preset, self.model, kept)
+
+    def horizons(self) -> list[dict[str, float]]:
+        """Members of pack_horizon_t until the next command acts, and for 10 s."""
+        return horizons(
+            self.preset,
+            spread_of(self.spread),
+            self.around,
+            self.model.error_bound_K,
+            all_seen=self.per_thermistor == 1,
+        )
 
     @property
     def pack_voltage_sensor(self) -> Sensor:

@@ -96,6 +96,14 @@ static void hear_message(pack_heard_t *heard, uint32_t index, uint64_t bits)
     case PACK_TRANSMITTED_FAULTS:
         heard->latched_faults = pack_code(bits, PACK_SIGNAL_LATCHED_FAULTS);
         break;
+    case PACK_TRANSMITTED_FUNCTION:
+        heard->allowed_now_A = pack_value(bits, PACK_SIGNAL_ALLOWED_CURRENT_NOW);
+        heard->allowed_soon_A = pack_value(bits, PACK_SIGNAL_ALLOWED_CURRENT_FOR10S);
+        break;
+    case PACK_TRANSMITTED_SPREAD:
+        heard->highest_soc = pack_value(bits, PACK_SIGNAL_HIGHEST_STATE_OF_CHARGE);
+        heard->lowest_soc = pack_value(bits, PACK_SIGNAL_LOWEST_STATE_OF_CHARGE);
+        break;
     case PACK_TRANSMITTED_IDENTITY:
         heard->model_hash = pack_code(bits, PACK_SIGNAL_MODEL_HASH);
         heard->preset_hash = pack_code(bits, PACK_SIGNAL_PRESET_HASH);

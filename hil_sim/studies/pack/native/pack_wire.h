@@ -40,6 +40,10 @@ typedef struct {
     float weakest_core_K;
     float weakest_soc;
     float limit_A;
+    float allowed_now_A;
+    float allowed_soon_A; /* for 10 s */
+    float highest_soc;
+    float lowest_soc;
     uint32_t active_faults;
     uint32_t latched_faults;
     uint32_t model_hash;
