@@ -111,7 +111,15 @@ class PackWire:
             },
         )
         nothing = [float("nan")] * lib.BMS_MAX_CELLS
-        self.heard: Any = ffi.new("pack_heard_t *", {"core_K": nothing, "soc": nothing})
+        self.heard: Any = ffi.new(
+            "pack_heard_t *",
+            {
+                "core_K": nothing,
+                "soc": nothing,
+                "highest_soc": nothing[0],
+                "lowest_soc": nothing[0],
+            },
+        )
         self.heard.state = self.heard.first_fault = _UNSAID
         self.sync = Frame(lib.PACK_SYNC_ID, b"")
 
