@@ -23,6 +23,7 @@ typedef struct {
     pack_bare_t bare;
     pack_horizon_t now;
     pack_horizon_t soon;
+    pack_balance_t balance;
     uint8_t thermistor_of[BMS_MAX_CELLS];
     bms_calibration_t calibration;
 } heading_t;
@@ -61,6 +62,7 @@ static bool play(rig_t *rig, int32_t recording, int32_t answers)
         .pack_voltage_error_V = heading->pack_voltage_error_V,
         .now = heading->now,
         .soon = heading->soon,
+        .balance = heading->balance,
     };
     pack_ecu_init(&rig->ecu, &config);
     bool is_well = true;

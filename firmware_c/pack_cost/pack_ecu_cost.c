@@ -152,6 +152,7 @@ static count_t count(rig_t *rig, uint32_t cells)
         .pack_voltage_error_V = 1.0f,
         .now = NOW,
         .soon = SOON,
+        .balance = { 10.0f, 0.8f, 0.002f },
     };
     pack_ecu_init(&rig->ecu, &config);
     for (uint32_t period = 0u; period < SETTLING + PERIODS; period++) {

@@ -4,6 +4,7 @@
 #include <stddef.h>
 
 #include "numeric.h"
+#include "pack_balance.h"
 #include "pack_cell.h"
 #include "pack_codec.h"
 #include "pack_network.h"
@@ -26,6 +27,7 @@ void pack_ecu_init(pack_ecu_t *ecu, const pack_ecu_config_t *config)
     if (config != NULL) {
         ecu->now = config->now;
         ecu->soon = config->soon;
+        ecu->balance = config->balance;
     }
     for (uint32_t page = 0u; page < pack_pages(BMS_MAX_CELLS); page++) {
         ecu->plug_in_age[page] = UINT8_MAX;
@@ -158,6 +160,7 @@ void pack_ecu_step(pack_ecu_t *ecu)
     }
     ecu->command_A = command_of(ecu);
     follow_function(ecu);
+    pack_balance_step(ecu);
     pack_report_queue(ecu);
     ecu->is_disturbed = false;
     ecu->periods++;

@@ -59,6 +59,9 @@ class PackResult:
     latched_faults: int = 0
     edge: int | None = None
     """Period in which the charge was asked for."""
+    full: int | None = None
+    """Period in which the pack became full."""
+    full_socs: list[float] = field(default_factory=list)
     peaks: Any = None
     final_socs: list[float] = field(default_factory=list)
     counted_soc: tuple[float, float] | None = None
@@ -141,6 +144,7 @@ class _Run:
             result.reason = self._stop_reason(heard)
             if not result.reason:
                 self._prepare(heard)
+                plant.bleed(heard)
                 plant.hold(obeyed_A(heard))
         result.wall_time_s = time.perf_counter() - start_s
         result.peaks, result.final_socs = plant.peaks(), plant.socs()
@@ -206,6 +210,15 @@ class _Run:
                 "same --cells, --preset and --model"
             )
 
+    def _has_balanced(self) -> bool:
+        """Whether the pack has been full for as long as it is to stay plugged in."""
+        result = self._result
+        if result.full is None:
+            result.full = result.steps
+            result.full_socs = self._plant.socs()
+        period_s = self._settings.preset.timing.sampling_period_s
+        return (result.steps - result.full) * period_s >= self._settings.balance_s
+
     def _stop_reason(self, heard: Any) -> str:
         result = self._result
         if result.edge is None or result.steps <= result.edge:
@@ -213,7 +226,7 @@ class _Run:
         if self._ends_early:
             if self._silent_periods >= SILENT_PERIODS:
                 return STOP_SILENT
-            if heard.state == CommandState.COMPLETE:
+            if heard.state == CommandState.COMPLETE and self._has_balanced():
                 return STOP_COMPLETE
             if heard.state == CommandState.FAULT:
                 return STOP_FAULT

@@ -30,6 +30,7 @@ class PackEcu:
         config = {
             "now": now,
             "soon": soon,
+            "balance": settings.balance(),
             "pack": {
                 "calibration": self._core.calibration,
                 "cells": settings.cells,

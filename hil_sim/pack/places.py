@@ -39,6 +39,7 @@ def recording(settings: PackChargeSettings, periods: Sequence[Period]) -> bytes:
     heading = _HEADING.pack(size, settings.cells, len(owners), settings.pack_voltage_error_V)
     structures = [ffi.new("pack_bare_t *", core.reserves.bare)]
     structures += [ffi.new("pack_horizon_t *", one) for one in settings.horizons()]
+    structures.append(ffi.new("pack_balance_t *", settings.balance()))
     heading += b"".join(bytes(ffi.buffer(one)) for one in structures) + bytes(owner_of)
     heading += bytes(ffi.buffer(core.calibration))
     sync = Frame(lib.PACK_SYNC_ID, b"")

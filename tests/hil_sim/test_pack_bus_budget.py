@@ -120,9 +120,9 @@ def test_the_command_prints_the_budget_and_refuses_in_one_line():
 
 
 def test_every_message_of_the_database_is_counted():
-    """Fourteen messages without pages, SYNC among them, and five groups."""
+    """Fourteen messages without pages, SYNC among them, and six groups."""
     messages = load_database(PACK).messages
     singles = [m for m in messages if not m.is_multiplexed()]
     one = budget(1)
-    assert one.frames == len(singles) + 5
-    assert one.bits == sum(most_bits(m.length) for m in singles) + 5 * most_bits(8)
+    assert one.frames == len(singles) + 6
+    assert one.bits == sum(most_bits(m.length) for m in singles) + 6 * most_bits(8)

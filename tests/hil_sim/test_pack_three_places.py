@@ -31,7 +31,9 @@ from hil_sim.pack.places import (
 from hil_sim.pack.settings import PackChargeSettings
 from tests.firmware.ports import ROOT, needs_emulator
 
-SYNC_ID, COMMAND_ID, DECISION_ID = 0x080, 0x280, 0x282
+SYNC_ID, COMMAND_ID, DECISION_ID, BLEED_ID = 0x080, 0x280, 0x282, 0x2B0
+ON = (50_000).to_bytes(2, "little")
+"""Of a bleed resistor, in steps of 2e-5."""
 PRESET, MODEL = load_pair("paper_calibrated", None)
 FIRMWARE = ROOT / "firmware_c"
 PLAYED = (
@@ -89,11 +91,12 @@ def starting_at(**changes):
 def played(tmp_path_factory):
     """Name -> settings, periods and the answers that the log has."""
     folder = tmp_path_factory.mktemp("recorded")
+    full, hot = starting_at(soc=0.88), starting_at(soc=0.2, temperature_K=315.0)
+    resistors = {"bleed_ohm": 10.0, "balance_s": 20.0}
     runs = {
-        "charge": (PackChargeSettings(starting_at(soc=0.88), MODEL, 5, seed=4), None),
-        "hot": (PackChargeSettings(starting_at(soc=0.2, temperature_K=315.0), MODEL, 5,
-                                   max_time_s=30.0), None),
-    }  # fmt: skip
+        "charge": (PackChargeSettings(full, MODEL, 5, seed=4, **resistors), None),
+        "hot": (PackChargeSettings(hot, MODEL, 5, max_time_s=30.0), None),
+    }
     runs |= {
         fault.name: (PackChargeSettings(PRESET, MODEL, 7, max_time_s=20.0), fault)
         for fault in FAULTS
@@ -155,6 +158,7 @@ def test_the_recorded_runs_have_a_whole_charge_and_faults_in_it(played):
     assert len(played) == 4 + len(PLAYED)
     assert "voltage" in governing(played["charge"][2])
     assert "core" in governing(played["hot"][2])
+    assert any(f[0] == BLEED_ID and f[2][2:4] == ON for f in FRAME.iter_unpack(played["charge"][2]))
     states = [frame[2][4] & 15 for frame in FRAME.iter_unpack(played["charge"][2])
               if frame[0] == COMMAND_ID]  # fmt: skip
     assert sorted(set(states)) == [0, 1, 2, 3, 4], "from the start until it is full"
