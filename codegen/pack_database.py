@@ -59,6 +59,10 @@ GROUPS = (
         "CellCharges", "Cell{:03d}StateOfCharge", 0x2A0, "ECU", *_CHARGE, 2,
         "Counted state of charge of each cell, in turn.",
     ),
+    Group(
+        "CellBleeds", "Cell{:03d}Bleed", 0x2B0, "ECU", *_CHARGE, 1,
+        "Share of the time in which the bleed resistor of each cell is on, 0 or 1, in turn.",
+    ),
 )  # fmt: skip
 
 
@@ -66,8 +70,10 @@ def pack_database() -> dict[str, str]:
     """File name -> text of the database of packs."""
     names = [
         "PackElectrical", "PackCoolant", "PackRequest",
-        *(f"{group.name}{m + 1}" for group in GROUPS for m in range(MESSAGES_A_GROUP)),
+        *(f"{g.name}{m + 1}" for g in GROUPS[:-1] for m in range(MESSAGES_A_GROUP)),
         "PackCommand", "PackEstimate", "PackDecision", "PackDiagnostics", "PackFaults",
+        "PackFunction", "PackSpread",
+        *(f"{GROUPS[-1].name}{m + 1}" for m in range(MESSAGES_A_GROUP)),
     ]  # fmt: skip
     taken = [data_ids(message) for message in load_database().messages if data_ids(message)]
     lists: dict[str, str] = {}

@@ -1,4 +1,5 @@
-# The programs that count instructions of a pack's control period, of its core and of its ECU, for the board with floating point.
+# The programs that count instructions of a pack's control period, of its core and of its ECU, and the one that answers recorded frames,
+# for the board with floating point.
 # Run from the repository's root: make -f firmware_c/pack_cost/pack_cost.mk build/firmware/mps2_an386/pack_cost.elf
 include firmware_c/port/mps2_an386/port.mk
 
@@ -19,3 +20,10 @@ $(BUILD)/application/$F/pack_ecu/%.o: CFLAGS += $(PACK_FLAGS) $(WHOLE)
 
 $(BUILD)/pack_ecu_cost.elf: $(PACK_ECU_OBJECTS) $F/pack_cost/pack_cost.ld $F/linker/ram.ld
 	@$(CROSS)gcc $(LINK_WHOLE) $(LDFLAGS) -T $F/pack_cost/pack_cost.ld $(PACK_ECU_OBJECTS) -lm -o $@
+
+ANSWERS_OBJECTS := $(subst /pack_ecu_cost.o,/pack_answers.o,$(PACK_ECU_OBJECTS))
+
+$(BUILD)/pack_answers.elf: $(ANSWERS_OBJECTS) $F/pack_cost/pack_cost.ld $F/linker/ram.ld
+	@$(CROSS)gcc $(LINK_WHOLE) $(LDFLAGS) -T $F/pack_cost/pack_cost.ld $(ANSWERS_OBJECTS) -lm -o $@
+
+$(PACK_ECU_OBJECTS) $(ANSWERS_OBJECTS): $(wildcard $F/pack/*.h $F/pack/generated/*.h $F/pack_ecu/*.h)

@@ -4,6 +4,8 @@
 #include <stddef.h>
 
 #include "numeric.h"
+#include "pack_balance.h"
+#include "pack_cell.h"
 #include "pack_codec.h"
 #include "pack_network.h"
 #include "pack_report.h"
@@ -22,6 +24,11 @@ void pack_ecu_init(pack_ecu_t *ecu, const pack_ecu_config_t *config)
     pack_init(&ecu->pack, (config != NULL) ? &config->pack : NULL);
     monitor_reset(&ecu->monitor);
     ecu->pack_voltage_error_V = (config != NULL) ? config->pack_voltage_error_V : NAN;
+    if (config != NULL) {
+        ecu->now = config->now;
+        ecu->soon = config->soon;
+        ecu->balance = config->balance;
+    }
     for (uint32_t page = 0u; page < pack_pages(BMS_MAX_CELLS); page++) {
         ecu->plug_in_age[page] = UINT8_MAX;
     }
@@ -109,9 +116,30 @@ static float command_of(const pack_ecu_t *ecu)
     return ecu->pack.command_A;
 }
 
+/* What a decision of this period leaves is not exceeded. */
+static void follow_function(pack_ecu_t *ecu)
+{
+    const pack_t *pack = &ecu->pack;
+    const rcbf_decision_t *decision = &pack->decision.decision;
+    ecu->allowed_now_A = 0.0f;
+    ecu->allowed_soon_A = 0.0f;
+    if (!ecu->has_started || is_stopped(ecu)) {
+        return;
+    }
+    const pack_worst_t worst = pack_worst(pack);
+    ecu->allowed_now_A = pack_function_A(pack, &worst, &ecu->now);
+    if (pack_is_charging(pack) && (decision->active != RCBF_NONE)) {
+        ecu->allowed_now_A = decision->feasible
+                                 ? numeric_larger(ecu->allowed_now_A, decision->lower_A)
+                                 : 0.0f;
+    }
+    ecu->allowed_soon_A =
+        numeric_larger(pack_function_A(pack, &worst, &ecu->soon), ecu->allowed_now_A);
+}
+
 static void follow_pace(pack_ecu_t *ecu)
 {
-    if ((ecu->pack.state == BMS_CHARGING) || (ecu->pack.state == BMS_DERATED)) {
+    if (pack_is_charging(&ecu->pack)) {
         pace_step(&ecu->pace, ecu->measured_periods);
     } else {
         ecu->pace = (pace_t){ 0 };
@@ -131,6 +159,8 @@ void pack_ecu_step(pack_ecu_t *ecu)
         note_faults(ecu);
     }
     ecu->command_A = command_of(ecu);
+    follow_function(ecu);
+    pack_balance_step(ecu);
     pack_report_queue(ecu);
     ecu->is_disturbed = false;
     ecu->periods++;

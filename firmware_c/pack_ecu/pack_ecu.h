@@ -16,6 +16,7 @@
 #include "pace.h"
 #include "pack.h"
 #include "pack_catalog.h"
+#include "pack_function.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -24,7 +25,7 @@ extern "C" {
 /* Groups that come every period, at the beginning of those of the catalogue; then those in turn. */
 #define PACK_ECU_SUPERVISED 2
 #define PACK_ECU_RECEIVED 3
-#define PACK_ECU_SENT 2
+#define PACK_ECU_SENT 3
 
 #define PACK_ECU_MESSAGES 3
 #define PACK_ECU_OUTBOX 16
@@ -32,15 +33,28 @@ extern "C" {
 /* In place of a cell's number on the bus, where they count from 1: none. */
 #define PACK_ECU_NO_CELL 0
 
+/* All zero for a pack without bleed resistors. */
+typedef struct {
+    float resistor_ohm; /* of each cell */
+    float least_soc;    /* below which no cell is bled */
+    float least_gap;    /* in state of charge, above the emptiest cell, from which on a cell is */
+} pack_balance_t;
+
 typedef struct {
     pack_config_t pack;
     float pack_voltage_error_V; /* of the sum of the cells' voltages against that of the pack */
+    pack_horizon_t now;         /* until the next command acts */
+    pack_horizon_t soon;        /* for 10 s */
+    pack_balance_t balance;
 } pack_ecu_config_t;
 
 typedef struct {
     pack_t pack;
     uint32_t periods;
     float pack_voltage_error_V;
+    pack_horizon_t now;
+    pack_horizon_t soon;
+    pack_balance_t balance;
     float current_A; /* what came last of each signal; NaN where its sender has no value */
     float pack_voltage_V;
     float coolant_in_K;
@@ -66,6 +80,10 @@ typedef struct {
     uint32_t latched_faults; /* of both, until the request goes off */
     uint8_t first_fault;
     float command_A;
+    float allowed_now_A; /* state of function */
+    float allowed_soon_A;
+    uint8_t bleeds[BMS_MAX_CELLS]; /* 1 for a cell that is bled */
+    float bled_soc[BMS_MAX_CELLS]; /* since the last charge */
     uint8_t turn[PACK_ECU_SENT]; /* page that is next to be sent */
     uint8_t page_counter[PACK_ECU_SENT][(BMS_MAX_CELLS + 2) / 3];
     uint8_t counter[PACK_TRANSMITTED_COUNT];

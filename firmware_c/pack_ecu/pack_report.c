@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stddef.h>
 
+#include "pack_balance.h"
 #include "pack_codec.h"
 
 /* The bus carries the first half of it. */
@@ -83,6 +84,22 @@ static uint64_t identity_of(const pack_ecu_t *ecu)
            pack_with_code(PACK_SIGNAL_NETWORK_VERSION, PACK_NETWORK_VERSION);
 }
 
+static uint64_t function_of(const pack_ecu_t *ecu)
+{
+    return pack_with_value(PACK_SIGNAL_ALLOWED_CURRENT_NOW, ecu->allowed_now_A,
+                           CODEC_TOWARDS_ZERO) |
+           pack_with_value(PACK_SIGNAL_ALLOWED_CURRENT_FOR10S, ecu->allowed_soon_A,
+                           CODEC_TOWARDS_ZERO);
+}
+
+static uint64_t spread_of(const pack_ecu_t *ecu)
+{
+    const range_t none = { NAN, NAN };
+    const range_t spread = ecu->pack.soc_known ? pack_balance_spread(ecu) : none;
+    return pack_with_value(PACK_SIGNAL_HIGHEST_STATE_OF_CHARGE, spread.high, CODEC_NEAREST) |
+           pack_with_value(PACK_SIGNAL_LOWEST_STATE_OF_CHARGE, spread.low, CODEC_NEAREST);
+}
+
 static uint64_t content_of(const pack_ecu_t *ecu, uint32_t message)
 {
     switch (message) {
@@ -96,6 +113,10 @@ static uint64_t content_of(const pack_ecu_t *ecu, uint32_t message)
         return pack_with_code(PACK_SIGNAL_LATCHED_FAULTS, ecu->latched_faults);
     case PACK_TRANSMITTED_IDENTITY:
         return identity_of(ecu);
+    case PACK_TRANSMITTED_FUNCTION:
+        return function_of(ecu);
+    case PACK_TRANSMITTED_SPREAD:
+        return spread_of(ecu);
     default:
         return pack_with_value(PACK_SIGNAL_COMMAND_CURRENT, ecu->command_A, CODEC_TOWARDS_ZERO) |
                pack_with_code(PACK_SIGNAL_COMMAND_STATE, (uint32_t)state_of(ecu));
@@ -119,7 +140,9 @@ static void queue_page(pack_ecu_t *ecu, uint32_t group, uint32_t page)
     for (uint32_t i = 0u; i < count; i++) {
         const pack_cell_t *cell = &pack->cell[first + i];
         const float soc = pack->soc_known ? cell->soc.soc : NAN;
-        values[i] = (group == PACK_GROUP_CELL_CORES) ? cell->estimate.core_temperature_K : soc;
+        const float bleeds = (float)ecu->bleeds[first + i];
+        const float charge = (group == PACK_GROUP_CELL_CHARGES) ? soc : bleeds;
+        values[i] = (group == PACK_GROUP_CELL_CORES) ? cell->estimate.core_temperature_K : charge;
     }
     can_frame_t *frame = next_frame(ecu);
     pack_fill_page(frame, group, page, values, count);
@@ -145,6 +168,7 @@ void pack_report_queue(pack_ecu_t *ecu)
     ecu->outbox_next = 0u;
     queue_pages(ecu, PACK_GROUP_CELL_CORES);
     queue_pages(ecu, PACK_GROUP_CELL_CHARGES);
+    queue_pages(ecu, PACK_GROUP_CELL_BLEEDS);
     for (uint32_t i = 0u; i < PACK_TRANSMITTED_COUNT; i++) {
         const codec_message_t *message = &PACK_TRANSMITTED[i];
         if ((ecu->periods % message->every_periods) != 0u) {

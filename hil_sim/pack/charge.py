@@ -60,8 +60,13 @@ class PackResult:
     latched_faults: int = 0
     edge: int | None = None
     """Period in which the charge was asked for."""
+    full: int | None = None
+    """Period in which the pack became full."""
+    full_socs: list[float] = field(default_factory=list)
     peaks: Any = None
     final_socs: list[float] = field(default_factory=list)
+    counted_soc: tuple[float, float] | None = None
+    """What the ECU counted last of the emptiest and the fullest cell."""
 
 
 def charge_pack(
@@ -146,6 +151,7 @@ class _Run:
             result.reason = self._stop_reason(heard)
             if not result.reason:
                 self._prepare(heard)
+                plant.bleed(heard)
                 plant.hold(obeyed_A(heard))
         result.wall_time_s = time.perf_counter() - start_s
         result.peaks, result.final_socs = plant.peaks(), plant.socs()
@@ -159,6 +165,8 @@ class _Run:
         result.supplied_A.append(self._plant.current_A)
         result.active_faults.append(int(heard.active_faults))
         result.latched_faults = int(heard.latched_faults)
+        if not math.isnan(heard.highest_soc):
+            result.counted_soc = (float(heard.lowest_soc), float(heard.highest_soc))
         if heard.first_fault != FirstFault.NONE and result.first_fault == FirstFault.NONE:
             result.first_fault = int(heard.first_fault)
             result.faulty_cell = int(heard.faulty_cell)
@@ -209,6 +217,15 @@ class _Run:
                 "same --cells, --preset and --model"
             )
 
+    def _has_balanced(self) -> bool:
+        """Whether the pack has been full for as long as it is to stay plugged in."""
+        result = self._result
+        if result.full is None:
+            result.full = result.steps
+            result.full_socs = self._plant.socs()
+        period_s = self._settings.preset.timing.sampling_period_s
+        return (result.steps - result.full) * period_s >= self._settings.balance_s
+
     def _stop_reason(self, heard: Any) -> str:
         result = self._result
         if result.edge is None or result.steps <= result.edge:
@@ -216,7 +233,7 @@ class _Run:
         if self._ends_early:
             if self._silent_periods >= SILENT_PERIODS:
                 return STOP_SILENT
-            if heard.state == CommandState.COMPLETE:
+            if heard.state == CommandState.COMPLETE and self._has_balanced():
                 return STOP_COMPLETE
             if heard.state == CommandState.FAULT:
                 return STOP_FAULT

@@ -26,7 +26,11 @@ class PackEcu:
             "uint8_t[]", [places.get(i, NO_THERMISTOR) for i in range(settings.cells)]
         )
         self.state: Any = ffi.new("pack_ecu_t *")
+        now, soon = settings.horizons()
         config = {
+            "now": now,
+            "soon": soon,
+            "balance": settings.balance(),
             "pack": {
                 "calibration": self._core.calibration,
                 "cells": settings.cells,

@@ -40,6 +40,7 @@ class PackPlant:
         self._string_noise = string
         self.fields: Any = self._charge.fields
         """The C structure with cells, sensors and current."""
+        self.fields.plant.bleed_ohm = settings.bleed_ohm
         self.charger = Charger(preset)
         self.measured: Any = ffi.new("pack_measured_t *")
         """What the sensors read last."""
@@ -72,6 +73,10 @@ class PackPlant:
         """Supply what may be supplied for a command, None without one, for a control period."""
         self.fields.current_A = self.charger.current_A(command_A)
         lib.plant_hold(ffi.addressof(self.fields, "plant"), self.fields.current_A, SUB_STEPS)
+
+    def bleed(self, heard: Any) -> None:
+        """Switch the bleed resistors as PackWire.hear has it."""
+        lib.pack_wire_bleed(heard, ffi.addressof(self.fields, "plant"))
 
     @property
     def current_A(self) -> float:
@@ -111,7 +116,15 @@ class PackWire:
             },
         )
         nothing = [float("nan")] * lib.BMS_MAX_CELLS
-        self.heard: Any = ffi.new("pack_heard_t *", {"core_K": nothing, "soc": nothing})
+        self.heard: Any = ffi.new(
+            "pack_heard_t *",
+            {
+                "core_K": nothing,
+                "soc": nothing,
+                "highest_soc": nothing[0],
+                "lowest_soc": nothing[0],
+            },
+        )
         self.heard.state = self.heard.first_fault = _UNSAID
         self.sync = Frame(lib.PACK_SYNC_ID, b"")
 

@@ -13,6 +13,7 @@ from bms.presets.schema import Sensor
 from hil_sim.pack.spread_kind import SpreadKind
 from hil_sim.studies.pack._pack import lib
 from hil_sim.studies.pack.engine import Core, View, all_cells
+from hil_sim.studies.pack.function import horizons
 from hil_sim.studies.pack.reserves import reserves
 from hil_sim.studies.pack.spread import Spread, Surroundings
 
@@ -39,6 +40,10 @@ class PackChargeSettings:
     max_time_s: float = 3600.0
     disturbed: bool = True
     answer_timeout_s: float = 1.0
+    bleed_ohm: float = 0.0
+    """Of the resistor across each cell; 0 for none."""
+    balance_s: float = 0.0
+    """For which a full pack stays plugged in."""
     around: Surroundings = field(default_factory=Surroundings)
 
     def __post_init__(self) -> None:
@@ -65,6 +70,24 @@ class PackChargeSettings:
         kept = _reserves(self.preset, spread_of(self.spread), self.around)
         return Core(self.preset, self.model, kept)
 
+    def horizons(self) -> list[dict[str, float]]:
+        """Members of pack_horizon_t until the next command acts, and for 10 s."""
+        return horizons(
+            self.preset,
+            spread_of(self.spread),
+            self.around,
+            self.model.error_bound_K,
+            all_seen=self.per_thermistor == 1,
+        )
+
+    def balance(self) -> dict[str, float]:
+        """Members of pack_balance_t."""
+        return {
+            "resistor_ohm": self.bleed_ohm,
+            "least_soc": BALANCE_LEAST_SOC,
+            "least_gap": BALANCE_LEAST_GAP,
+        }
+
     @property
     def pack_voltage_sensor(self) -> Sensor:
         """The sensor across the whole string, as the cells' are over as many."""
@@ -81,6 +104,9 @@ class PackChargeSettings:
 
 _reserves = lru_cache(maxsize=8)(reserves)
 """A second to compute, for plant, ECU and every further run."""
+
+BALANCE_LEAST_SOC, BALANCE_LEAST_GAP = 0.8, 0.002
+"""Near the top; and a gap that is more than what counting misses in an hour."""
 
 PACK_VOLTAGE_STEP_V = 0.01
 """Half a step of PackVoltage; a test holds it to the database."""

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from bms.arrays import Array
+from bms.presets import Preset
 from hil_sim.bus.catalog import FirstFault
 from hil_sim.pack.charge import PackResult
 from hil_sim.run.result import STOP_COMPLETE
@@ -13,16 +15,22 @@ from hil_sim.run.result import STOP_COMPLETE
 KINDS = ("soc", "core_temperature_K", "surface_temperature_K", "voltage_V")
 
 
+def limits_of(preset: Preset) -> Array:
+    """Limits of KINDS."""
+    limits = preset.limits
+    return np.array(
+        [
+            limits.max_soc,
+            limits.max_core_temperature_K,
+            limits.max_surface_temperature_K,
+            limits.max_voltage_V,
+        ]
+    )
+
+
 def margins(result: PackResult) -> Any:
     """What each cell left of each limit at its worst, (cells, KINDS); below 0 it was crossed."""
-    limits = result.settings.preset.limits
-    bounds = (
-        limits.max_soc,
-        limits.max_core_temperature_K,
-        limits.max_surface_temperature_K,
-        limits.max_voltage_V,
-    )
-    return np.array(bounds) - result.peaks
+    return limits_of(result.settings.preset) - result.peaks
 
 
 def has_passed(result: PackResult) -> bool:
@@ -52,6 +60,8 @@ def summary(result: PackResult) -> dict[str, Any]:
         "max_voltage_V": float(result.peaks[:, 3].max()),
         "fullest_soc": max(result.final_socs),
         "emptiest_soc": min(result.final_socs),
+        "counted_fullest_soc": result.counted_soc[1] if result.counted_soc else None,
+        "counted_emptiest_soc": result.counted_soc[0] if result.counted_soc else None,
         "weakest_cell": max(result.governed, key=lambda c: (result.governed[c], -c), default=None),
         "governed_s": {str(c): round(n * period_s, 6) for c, n in sorted(result.governed.items())},
         "constraint_s": {

@@ -79,7 +79,7 @@ def test_192_cells_fit_into_500_kbit_and_1_mbit_but_not_into_125():
         require_fit(need, rate)
     with pytest.raises(InputError) as refused:
         require_fit(need, 125_000)
-    assert "take 108 cells at most, or a bus of 250 kbit/s" in str(refused.value)
+    assert "take 105 cells at most, or a bus of 250 kbit/s" in str(refused.value)
     assert "\n" not in str(refused.value)
 
 
@@ -129,13 +129,13 @@ def test_the_command_prints_the_budget_and_refuses_in_one_line():
     )  # fmt: skip
     assert refused.returncode == 2 and refused.stdout == ""
     (line,) = refused.stderr.strip().splitlines()
-    assert "108 cells" in line
+    assert "105 cells" in line
 
 
 def test_every_message_of_the_database_is_counted():
-    """Twelve messages without pages, SYNC among them, and five groups."""
+    """Fourteen messages without pages, SYNC among them, and six groups."""
     messages = load_database(PACK).messages
     singles = [m for m in messages if not m.is_multiplexed()]
     one = budget(1)
-    assert one.frames == len(singles) + 5
-    assert one.bits == sum(most_bits(m.length) for m in singles) + 5 * most_bits(8)
+    assert one.frames == len(singles) + 6
+    assert one.bits == sum(most_bits(m.length) for m in singles) + 6 * most_bits(8)

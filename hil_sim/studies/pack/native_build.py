@@ -20,6 +20,7 @@ PACK = NativeExtension(
     headers=(
         *CORE_HEADERS,
         "firmware_c/pack/pack.h",
+        "firmware_c/pack/pack_function.h",
         "firmware_c/pack/generated/pack_catalog.h",
         "firmware_c/pack_ecu/pack_ecu.h",
         f"{NATIVE_FOLDER}/cell.h",

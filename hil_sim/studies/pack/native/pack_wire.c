@@ -96,6 +96,14 @@ static void hear_message(pack_heard_t *heard, uint32_t index, uint64_t bits)
     case PACK_TRANSMITTED_FAULTS:
         heard->latched_faults = pack_code(bits, PACK_SIGNAL_LATCHED_FAULTS);
         break;
+    case PACK_TRANSMITTED_FUNCTION:
+        heard->allowed_now_A = pack_value(bits, PACK_SIGNAL_ALLOWED_CURRENT_NOW);
+        heard->allowed_soon_A = pack_value(bits, PACK_SIGNAL_ALLOWED_CURRENT_FOR10S);
+        break;
+    case PACK_TRANSMITTED_SPREAD:
+        heard->highest_soc = pack_value(bits, PACK_SIGNAL_HIGHEST_STATE_OF_CHARGE);
+        heard->lowest_soc = pack_value(bits, PACK_SIGNAL_LOWEST_STATE_OF_CHARGE);
+        break;
     case PACK_TRANSMITTED_IDENTITY:
         heard->model_hash = pack_code(bits, PACK_SIGNAL_MODEL_HASH);
         heard->preset_hash = pack_code(bits, PACK_SIGNAL_PRESET_HASH);
@@ -124,6 +132,47 @@ static void hear_page(pack_heard_t *heard, uint32_t group, const can_frame_t *fr
     }
 }
 
+/* Only a page that is intact and in sequence switches anything on, and not for long. */
+static void hear_bleeds(pack_wire_t *wire, pack_heard_t *heard, const can_frame_t *frame)
+{
+    uint32_t page;
+    if (!pack_page_of(PACK_GROUP_CELL_BLEEDS, frame, &page)) {
+        return;
+    }
+    const codec_message_t *message = pack_page_message(PACK_GROUP_CELL_BLEEDS, page);
+    if (e2e_check(&wire->bleed_page[page], frame->data, frame->length, message->length,
+                  message->data_ids, message->policy.max_delta_counter) != E2E_OK) {
+        return;
+    }
+    wire->bleed_age[page] = 0u;
+    for (uint32_t place = 0u; place < PACK_CELLS_A_PAGE; place++) {
+        const uint32_t cell = page * PACK_CELLS_A_PAGE + place;
+        if (cell < BMS_MAX_CELLS) {
+            heard->bleeds[cell] =
+                pack_page_value(PACK_GROUP_CELL_BLEEDS, frame, place) >= 0.5f;
+        }
+    }
+}
+
+static void age_bleeds(pack_wire_t *wire, pack_heard_t *heard)
+{
+    for (uint32_t cell = 0u; cell < BMS_MAX_CELLS; cell++) {
+        const uint32_t page = cell / PACK_CELLS_A_PAGE;
+        if (wire->bleed_age[page] >= PACK_BLEED_PERIODS) {
+            heard->bleeds[cell] = false;
+        } else if (cell % PACK_CELLS_A_PAGE == 0u) {
+            wire->bleed_age[page]++;
+        }
+    }
+}
+
+void pack_wire_bleed(const pack_heard_t *heard, plant_t *plant)
+{
+    for (uint32_t i = 0u; i < plant->cells; i++) {
+        plant->cell[i].bleeds = heard->bleeds[i] && (plant->bleed_ohm > 0.0);
+    }
+}
+
 static void hear_command(pack_wire_t *wire, const can_frame_t *frame, pack_heard_t *heard)
 {
     const codec_message_t *message = &PACK_TRANSMITTED[PACK_TRANSMITTED_COMMAND];
@@ -140,6 +189,7 @@ void pack_wire_hear(pack_wire_t *wire, const can_frame_t *frames, uint32_t count
     uint32_t commands = 0u;
     heard->command_A = NAN;
     heard->state = UINT8_MAX;
+    age_bleeds(wire, heard);
     for (uint32_t n = 0u; n < count; n++) {
         const can_frame_t *frame = &frames[n];
         if (frame->id == command->id) {
@@ -147,6 +197,7 @@ void pack_wire_hear(pack_wire_t *wire, const can_frame_t *frames, uint32_t count
             commands += is_intact(frame, command) ? 1u : 0u;
             continue;
         }
+        hear_bleeds(wire, heard, frame);
         hear_page(heard, PACK_GROUP_CELL_CORES, frame);
         hear_page(heard, PACK_GROUP_CELL_CHARGES, frame);
         for (uint32_t i = 0u; i < PACK_TRANSMITTED_COMMAND; i++) {

@@ -22,6 +22,8 @@ typedef struct {
     uint8_t page_counter[PACK_ECU_RECEIVED][(BMS_MAX_CELLS + 2) / 3];
     uint32_t turn; /* page of the states of charge that is next */
     e2e_receiver_t command;
+    e2e_receiver_t bleed_page[(BMS_MAX_CELLS + 2) / 3];
+    uint8_t bleed_age[(BMS_MAX_CELLS + 2) / 3]; /* in periods since a page could be obeyed */
 } pack_wire_t;
 
 /* What the ECU said; NaN, and all ones, where it has not said it or has no value. */
@@ -40,12 +42,17 @@ typedef struct {
     float weakest_core_K;
     float weakest_soc;
     float limit_A;
+    float allowed_now_A;
+    float allowed_soon_A; /* for 10 s */
+    float highest_soc;
+    float lowest_soc;
     uint32_t active_faults;
     uint32_t latched_faults;
     uint32_t model_hash;
     uint32_t preset_hash;
     float core_K[BMS_MAX_CELLS]; /* as it came last of each cell */
     float soc[BMS_MAX_CELLS];
+    bool bleeds[BMS_MAX_CELLS]; /* that may be obeyed */
 } pack_heard_t;
 
 /* Fills the frames of a period, without SYNC, and returns how many they are. */
@@ -55,6 +62,12 @@ uint32_t pack_wire_publish(pack_wire_t *wire, const pack_measured_t *measured, f
 /* Takes the frames of a period's answer. Of several commands in one none is obeyed. */
 void pack_wire_hear(pack_wire_t *wire, const can_frame_t *frames, uint32_t count,
                     pack_heard_t *heard);
+
+/* Periods for which a page of bleeds that does not come again holds. */
+#define PACK_BLEED_PERIODS 100
+
+/* Switches the resistors of a plant as was heard. */
+void pack_wire_bleed(const pack_heard_t *heard, plant_t *plant);
 
 /* Identifier of what an ECU's step ends with. */
 uint32_t pack_command_id(void);

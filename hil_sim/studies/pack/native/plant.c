@@ -28,10 +28,19 @@ static cell_state_t coupling_of(plant_t *plant, uint32_t i)
     };
 }
 
-static void note_voltage(plant_cell_t *one, double current_A)
+/* Current of a cell, of which the resistor takes its part. */
+static double own_current_A(const plant_t *plant, const plant_cell_t *one, double current_A)
 {
-    one->peaks.voltage_V = larger(
-        one->peaks.voltage_V, cell_terminal_voltage_V(&one->cell, &one->memory, current_A));
+    return one->bleeds ? current_A + cell_terminal_voltage_V(&one->cell, &one->memory, current_A) /
+                                         plant->bleed_ohm
+                       : current_A;
+}
+
+static void note_voltage(const plant_t *plant, plant_cell_t *one, double current_A)
+{
+    const double own_A = own_current_A(plant, one, current_A);
+    one->peaks.voltage_V = larger(one->peaks.voltage_V,
+                                  cell_terminal_voltage_V(&one->cell, &one->memory, own_A));
 }
 
 static void note_peaks(plant_t *plant, plant_cell_t *one, uint32_t i, double current_A)
@@ -43,7 +52,7 @@ static void note_peaks(plant_t *plant, plant_cell_t *one, uint32_t i, double cur
     one->peaks.soc = larger(one->peaks.soc, state->soc);
     one->peaks.core_temperature_K = larger(one->peaks.core_temperature_K, state->core);
     one->peaks.surface_temperature_K = larger(one->peaks.surface_temperature_K, state->surface);
-    note_voltage(one, current_A);
+    note_voltage(plant, one, current_A);
     plant->most_surface_K_per_s = larger(plant->most_surface_K_per_s, fabs(one->coupling.surface));
     plant->most_coolant_K_per_s = larger(plant->most_coolant_K_per_s, fabs(one->coupling.coolant));
     plant->most_uneven_K = larger(plant->most_uneven_K, fabs(state->coolant - even_K));
@@ -79,8 +88,8 @@ static void step(plant_t *plant, double current_A)
     plant->has_coupling = true;
     for (uint32_t i = 0u; i < plant->cells; i++) {
         plant_cell_t *one = &plant->cell[i];
-        cell_step(&one->cell, &one->memory, current_A, plant->cooling_power_W, &one->before,
-                  &one->after);
+        cell_step(&one->cell, &one->memory, own_current_A(plant, one, current_A),
+                  plant->cooling_power_W, &one->before, &one->after);
         note_peaks(plant, one, i, current_A);
     }
 }
@@ -88,7 +97,7 @@ static void step(plant_t *plant, double current_A)
 void plant_hold(plant_t *plant, double current_A, uint32_t steps)
 {
     for (uint32_t i = 0u; i < plant->cells; i++) {
-        note_voltage(&plant->cell[i], current_A);
+        note_voltage(plant, &plant->cell[i], current_A);
     }
     for (uint32_t i = 0u; i < steps; i++) {
         step(plant, current_A);
@@ -98,5 +107,6 @@ void plant_hold(plant_t *plant, double current_A, uint32_t steps)
 double plant_voltage_V(const plant_t *plant, uint32_t cell, double current_A)
 {
     const plant_cell_t *one = &plant->cell[cell];
-    return cell_terminal_voltage_V(&one->cell, &one->memory, current_A);
+    return cell_terminal_voltage_V(&one->cell, &one->memory,
+                                   own_current_A(plant, one, current_A));
 }

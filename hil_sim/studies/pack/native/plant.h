@@ -16,6 +16,7 @@ typedef struct {
     cell_state_t before;     /* all of it together, at the beginning and the end of a sub-step */
     cell_state_t after;
     cell_peaks_t peaks;
+    bool bleeds; /* its resistor is on */
 } plant_cell_t;
 
 typedef struct {
@@ -25,6 +26,7 @@ typedef struct {
     double flow_W_per_K;      /* heat capacity of the coolant that passes in a second */
     double cooling_power_W;   /* of one cell, in the mean */
     double inlet_K;           /* coolant before the first cell */
+    double bleed_ohm;         /* of the resistor across each cell */
     bool has_coupling;        /* that of the last sub-step is known */
     double most_surface_K_per_s; /* magnitude of what neighbours and coolant do to a cell, so far */
     double most_coolant_K_per_s;

@@ -1,0 +1,235 @@
+"""Passive balancing: the spread of a full pack shrinks, and nothing is bled that must not be."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bms.model.pair import load_pair
+from hil_sim.pack.charge import charge_pack
+from hil_sim.pack.ecu import PackEcu
+from hil_sim.pack.plant import PackPlant, PackWire, obeyed_A
+from hil_sim.pack.settings import PackChargeSettings
+from hil_sim.pack.summary import margins
+from hil_sim.studies.pack._pack import lib
+
+ROOT = Path(__file__).parents[2]
+PRESET, MODEL = load_pair("paper_calibrated", None)
+NEARLY_FULL = replace(PRESET, initial=replace(PRESET.initial, soc=0.93))
+COMPLETE, BLEED_ID = 4, 0x2B0
+CELLS = 6
+
+
+def settings_of(**changes):
+    """A pack that is full soon, with 10 ohm across each cell."""
+    return PackChargeSettings(
+        NEARLY_FULL, MODEL, CELLS, **({"bleed_ohm": 10.0, "seed": 1} | changes)
+    )
+
+
+def spread(socs):
+    return max(socs) - min(socs)
+
+
+@cache
+def balanced():
+    return charge_pack(settings_of(balance_s=900.0))
+
+
+def test_the_spread_of_a_full_pack_shrinks_and_no_limit_is_crossed():
+    result = balanced()
+    assert result.reason == "complete"
+    assert spread(result.full_socs) > 0.01
+    assert spread(result.final_socs) < 0.35 * spread(result.full_socs)
+    assert (margins(result) >= 0.0).all()
+    assert result.latched_faults == 0
+
+
+def test_the_emptiest_cell_is_never_bled():
+    result = balanced()
+    emptiest = int(np.argmin(result.full_socs))
+    assert result.final_socs[emptiest] == pytest.approx(result.full_socs[emptiest], abs=1e-4)
+
+
+def test_without_resistors_the_spread_stays():
+    result = charge_pack(settings_of(bleed_ohm=0.0, balance_s=100.0))
+    assert spread(result.final_socs) == pytest.approx(spread(result.full_socs), abs=1e-3)
+
+
+def test_what_is_counted_includes_what_was_bled():
+    low, high = balanced().counted_soc
+    assert high - low < 0.004
+    assert high < 0.99
+
+
+class Rig:
+    """A full pack that is being balanced."""
+
+    def __init__(self, **changes):
+        settings = settings_of(**changes)
+        self.ecu, self.plant = PackEcu(settings), PackPlant(settings)
+        self.wire, self.charge, self.heard = PackWire(settings, self.plant), False, None
+        self.run(20)
+        self.charge = True
+        self.run(1500, until=lambda: any(self.bleeds))
+        assert any(self.bleeds) and self.ecu.state.pack.state == COMPLETE
+
+    def run(self, periods, until=lambda: False, sent=lambda f: f, heard=lambda f: f, tamper=None):
+        for _ in range(periods):
+            self.plant.measure()
+            if tamper is not None:
+                tamper(self.plant)
+            frames = sent(self.wire.publish(self.charge))
+            self.heard = self.wire.hear(heard(self.ecu.exchange(frames)))
+            self.plant.bleed(self.heard)
+            self.plant.hold(obeyed_A(self.heard))
+            if until():
+                return
+
+    @property
+    def bleeds(self):
+        """As the ECU has it."""
+        return [bool(self.ecu.state.bleeds[i]) for i in range(CELLS)]
+
+    @property
+    def bled(self):
+        """As the plant does."""
+        return [bool(self.plant.fields.plant.cell[i].bleeds) for i in range(CELLS)]
+
+
+def without(frame_id):
+    return lambda frames: [frame for frame in frames if frame.frame_id != frame_id]
+
+
+def test_what_the_ecu_says_the_plant_does():
+    rig = Rig()
+    rig.run(5)
+    assert rig.bled == rig.bleeds
+    assert not all(rig.bled)
+
+
+def test_while_charging_nothing_is_bled():
+    settings = settings_of()
+    ecu, plant = PackEcu(settings), PackPlant(settings)
+    wire, charging = PackWire(settings, plant), 0
+    for period in range(400):
+        plant.measure()
+        heard = wire.hear(ecu.exchange(wire.publish(period > 20)))
+        if heard.command_A < 0.0:
+            charging += 1
+            assert not any(ecu.state.bleeds[i] for i in range(CELLS))
+        plant.hold(obeyed_A(heard))
+    assert charging > 100
+
+
+@pytest.mark.parametrize("lost", [0x200, 0x201, 0x202, 0x210, 0x220])
+def test_in_a_period_without_a_message_or_a_page_nothing_is_bled(lost):
+    rig = Rig()
+    rig.run(1, sent=without(lost))
+    assert not any(rig.bleeds)
+    rig.run(1)
+    assert any(rig.bleeds)
+
+
+@pytest.mark.parametrize("quantity", ["voltage_V", "surface_temperature_K"])
+def test_with_a_reading_that_is_no_number_nothing_is_bled(quantity):
+    def tamper(plant):
+        getattr(plant.measured, quantity)[0] = math.nan
+
+    rig = Rig()
+    rig.run(1, tamper=tamper)
+    assert not any(rig.bleeds)
+
+
+def test_while_a_current_flows_nothing_is_bled_whoever_drives_it():
+    def tamper(plant):
+        plant.measured.current_A = 0.5
+
+    rig = Rig()
+    rig.run(1, tamper=tamper)
+    assert not any(rig.bleeds)
+
+
+def test_when_the_bleeds_do_not_come_any_more_the_plant_ends_them():
+    rig = Rig()
+    rig.run(5)
+    rig.run(lib.PACK_BLEED_PERIODS + 2, heard=without(BLEED_ID))
+    assert not any(rig.bled)
+    assert any(rig.bleeds)
+
+
+@pytest.mark.parametrize("damage", ["corrupted", "frozen"])
+def test_bleeds_that_are_corrupted_or_frozen_are_not_obeyed(damage):
+    rig, old = Rig(), {}
+
+    def damaged(frame):
+        if frame.frame_id != BLEED_ID:
+            return frame
+        if damage == "frozen":
+            return old.setdefault(frame.data[1] >> 4, frame)
+        return frame._replace(data=bytes([frame.data[0] ^ 1, *frame.data[1:]]))
+
+    def heard(frames):
+        return [damaged(frame) for frame in frames]
+
+    rig.run(2 * lib.PACK_BLEED_PERIODS + 10, heard=heard)
+    assert not any(rig.bled)
+
+
+def test_a_charge_that_begins_anew_forgets_what_was_bled():
+    rig = Rig()
+    rig.run(600)
+    assert max(rig.ecu.state.bled_soc[i] for i in range(CELLS)) > 0.002
+    rig.charge = False
+    rig.run(5)
+    assert any(rig.bleeds), "at rest with the request off it goes on"
+    for i, soc in enumerate(rig.plant.socs()):
+        rig.wire._socs[i] = soc
+    rig.run(20)
+    rig.charge = True
+    rig.run(3)
+    assert max(rig.ecu.state.bled_soc[i] for i in range(CELLS)) == 0.0
+
+
+def test_a_resistor_that_is_stuck_on_crosses_no_limit():
+    rig = Rig()
+    stuck = int(np.argmax(rig.plant.socs()))
+    for _ in range(3000):
+        rig.run(1)
+        rig.plant.fields.plant.cell[stuck].bleeds = True
+    peaks = rig.plant.peaks()
+    assert (peaks[:, 3] <= PRESET.limits.max_voltage_V).all()
+    assert (peaks[:, 0] <= PRESET.limits.max_soc).all()
+    assert rig.heard.command_A == 0.0
+
+
+BALANCE = "firmware_c/pack_ecu/pack_balance.c"
+BROKEN = {
+    "symptoms": ("(symptoms == 0u) && ", "missing"),
+    "gap": ("(soc - lowest_soc > least_gap)", "emptiest"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("broken", BROKEN)
+def test_without_its_rule_a_cell_is_bled_that_must_not_be(tmp_path, broken):
+    text, _ = BROKEN[broken]
+    tree = tmp_path / "tree"
+    for folder in ("firmware_c", "hil_sim/native", "hil_sim/studies/pack/native"):
+        shutil.copytree(ROOT / folder, tree / folder)
+    original = (tree / BALANCE).read_text()
+    assert original.count(text) == 1
+    other = "" if text.endswith("&& ") else "true"
+    (tree / BALANCE).write_text(original.replace(text, other))
+    command = [sys.executable, "-m", "tests.hil_sim.balance_mutant", tree, tmp_path / "out"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert BROKEN[broken][1] in done.stdout
