@@ -56,7 +56,8 @@ static bool config_is_valid(const pack_config_t *config)
     }
     const uint32_t most = (config->calibration->family.is_stated != 0u) ? BMS_MAX_FAMILY_CELLS
                                                                         : BMS_MAX_CELLS;
-    return (config->cells >= 1u) && (config->cells <= most) && map_is_valid(config);
+    return (config->cells >= 1u) && (config->cells <= most) &&
+           (config->thermistors <= config->cells) && map_is_valid(config);
 }
 
 void pack_init(pack_t *pack, const pack_config_t *config)

@@ -40,13 +40,16 @@ void pack_ecu_receive(pack_ecu_t *ecu, const can_frame_t *frame)
 }
 
 /* What came of a request holds as long as it is usable; a fault ends what was asked for, so that the
- * charger has to ask anew. */
+ * charger has to ask anew. The states of charge that were told until then are of the past. */
 static void follow_request(pack_ecu_t *ecu, uint32_t symptoms)
 {
     if (!ecu->is_usable[PACK_RECEIVED_REQUEST]) {
         return;
     }
     if (ecu->request == REQUEST_OFF) {
+        if (ecu->is_asked) {
+            pack_network_forget_plug_in(ecu);
+        }
         ecu->is_asked = false;
         if (symptoms == 0u) {
             monitor_reset(&ecu->monitor);

@@ -69,8 +69,11 @@ typedef struct {
     e2e_receiver_t receiver[PACK_ECU_MESSAGES];
     bool is_usable[PACK_ECU_MESSAGES];
     e2e_receiver_t page[PACK_ECU_RECEIVED][(BMS_MAX_CELLS + 2) / 3];
+    /* By how much a page's counter is ahead of PackElectrical's, since before the charge. */
+    uint8_t phase[PACK_ECU_SUPERVISED][(BMS_MAX_CELLS + 2) / 3];
     uint8_t plug_in_age[(BMS_MAX_CELLS + 2) / 3]; /* in periods */
     bool is_disturbed; /* a frame of this period was refused, or is of cells that are not there */
+    bool is_page_missing[PACK_ECU_SUPERVISED]; /* in this period, by group */
     uint8_t missing_cell; /* first one without a page in this period, or PACK_NO_CELL */
     pace_t pace;
     uint8_t measured_periods; /* since the last step, by the counter of PackElectrical */

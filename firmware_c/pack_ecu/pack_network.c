@@ -124,6 +124,11 @@ void pack_network_receive(pack_ecu_t *ecu, const can_frame_t *frame)
     }
 }
 
+static bool is_charging(const pack_ecu_t *ecu)
+{
+    return (ecu->pack.state == BMS_CHARGING) || (ecu->pack.state == BMS_DERATED);
+}
+
 static void forget_page(pack_ecu_t *ecu, uint32_t group, uint32_t page)
 {
     float *values = &values_of(ecu, group)[page * PACK_CELLS_A_PAGE];
@@ -147,14 +152,33 @@ static uint8_t cell_of(const pack_ecu_t *ecu, uint32_t group, uint32_t index)
     return (uint8_t)index;
 }
 
+/* The messages of a period count together. One that has fallen behind in a queue is of the past,
+ * though none of its frames is missing. */
+static uint8_t phase_of(const pack_ecu_t *ecu, uint32_t group, uint32_t page)
+{
+    const uint8_t now = ecu->receiver[PACK_RECEIVED_ELECTRICAL].counter;
+    return (uint8_t)((ecu->page[group][page].counter - now) & (E2E_COUNTERS - 1u));
+}
+
+static bool is_late(const pack_ecu_t *ecu, uint32_t group, uint32_t page)
+{
+    return ecu->is_usable[PACK_RECEIVED_ELECTRICAL] &&
+           (phase_of(ecu, group, page) != ecu->phase[group][page]);
+}
+
 static void judge_pages(pack_ecu_t *ecu, uint32_t group)
 {
     const uint32_t pages = pack_pages(count_of(ecu, group));
+    ecu->is_page_missing[group] = false;
     for (uint32_t page = 0u; page < pages; page++) {
         const e2e_verdict_t verdict =
             e2e_supervise(&ecu->page[group][page], &pack_page_message(group, page)->policy);
         ecu->is_disturbed = ecu->is_disturbed || verdict.is_disturbed;
-        if (!verdict.is_usable) {
+        if (verdict.is_usable && ecu->is_usable[PACK_RECEIVED_ELECTRICAL] && !is_charging(ecu)) {
+            ecu->phase[group][page] = phase_of(ecu, group, page);
+        }
+        if (!verdict.is_usable || is_late(ecu, group, page)) {
+            ecu->is_page_missing[group] = true;
             forget_page(ecu, group, page);
             if (ecu->missing_cell == PACK_NO_CELL) {
                 ecu->missing_cell = cell_of(ecu, group, page * PACK_CELLS_A_PAGE);
@@ -175,6 +199,14 @@ static void age_plug_in_pages(pack_ecu_t *ecu)
         } else {
             ecu->plug_in_age[page]++;
         }
+    }
+}
+
+void pack_network_forget_plug_in(pack_ecu_t *ecu)
+{
+    for (uint32_t page = 0u; page < pack_pages(ecu->pack.cells); page++) {
+        ecu->plug_in_age[page] = UINT8_MAX;
+        forget_page(ecu, PACK_GROUP_PLUG_IN_CHARGES, page);
     }
 }
 
@@ -219,19 +251,6 @@ bool pack_network_is_valid(const pack_ecu_t *ecu)
     return is_valid;
 }
 
-/* Whether any page of a group has not come usable; of this period, as its newest good period is. */
-static bool is_page_missing(const pack_ecu_t *ecu, uint32_t group)
-{
-    const uint32_t pages = pack_pages(count_of(ecu, group));
-    for (uint32_t page = 0u; page < pages; page++) {
-        const e2e_receiver_t *receiver = &ecu->page[group][page];
-        if ((receiver->state != E2E_VALID) || ((receiver->good_periods & 1u) == 0u)) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /* The cells' voltages are those of one string: together they are the pack's. */
 static bool sum_deviates(const pack_ecu_t *ecu)
 {
@@ -250,10 +269,10 @@ static bool request_is_wrong(const pack_ecu_t *ecu)
 
 uint32_t pack_network_symptoms(const pack_ecu_t *ecu)
 {
-    const bool is_voltage_missing = is_page_missing(ecu, PACK_GROUP_CELL_VOLTAGES);
-    const bool is_electrical = ecu->is_usable[PACK_RECEIVED_ELECTRICAL] && !is_voltage_missing;
+    const bool is_electrical = ecu->is_usable[PACK_RECEIVED_ELECTRICAL] &&
+                               !ecu->is_page_missing[PACK_GROUP_CELL_VOLTAGES];
     return bit_if(!is_electrical, FAULT_ELECTRICAL_MISSING) |
-           bit_if(is_page_missing(ecu, PACK_GROUP_CELL_TEMPERATURES), FAULT_THERMAL_MISSING) |
+           bit_if(ecu->is_page_missing[PACK_GROUP_CELL_TEMPERATURES], FAULT_THERMAL_MISSING) |
            bit_if(!ecu->is_usable[PACK_RECEIVED_COOLANT], FAULT_COOLANT_MISSING) |
            bit_if(!ecu->is_usable[PACK_RECEIVED_REQUEST], FAULT_REQUEST_MISSING) |
            bit_if(ecu->is_usable[PACK_RECEIVED_REQUEST] && request_is_wrong(ecu),

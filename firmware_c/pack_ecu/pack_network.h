@@ -9,6 +9,9 @@ void pack_network_receive(pack_ecu_t *ecu, const can_frame_t *frame);
 /* Ends a period: judges every message and page. Readings without a usable page become NaN. */
 void pack_network_step(pack_ecu_t *ecu);
 
+/* States of charge at plug-in are no numbers until each page has come anew. */
+void pack_network_forget_plug_in(pack_ecu_t *ecu);
+
 /* Whether all that has to come every period has done so often enough to be trusted. */
 bool pack_network_is_valid(const pack_ecu_t *ecu);
 

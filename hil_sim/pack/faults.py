@@ -105,6 +105,21 @@ def _as_another_page(frame: Frame, since: int) -> list[Frame]:
     return [Frame(frame.frame_id, bytes([frame.data[0], frame.data[1] & 0x0F, *frame.data[2:]]))]
 
 
+def _late(first_id: int) -> Delivery:
+    """A queue that has grown by a period: from then on each frame comes in the next one."""
+    waiting: list[Frame] = []
+
+    def deliver(frame: Frame, since: int) -> list[Frame]:
+        if not _is_page(frame, first_id):
+            return [frame]
+        if since == 0:
+            waiting.clear()
+        waiting.append(frame)
+        return [] if since == 0 else [waiting.pop(0)]
+
+    return deliver
+
+
 def _frozen(first_id: int) -> Delivery:
     """A gateway that repeats an old frame."""
     old: list[Frame] = []
@@ -189,6 +204,8 @@ FAULTS = (
     PackFault("voltage page under another's number", 0, (MISSING_V,), delivery=_as_another_page),
     PackFault("voltage page frozen", 1, (MISSING_V,), delivery=_frozen(VOLTAGE_ID)),
     PackFault("temperature page frozen", 1, (MISSING_T,), delivery=_frozen(TEMPERATURE_ID)),
+    PackFault("voltage page a period late", 0, (MISSING_V,), delivery=_late(VOLTAGE_ID)),
+    PackFault("temperature page a period late", 0, (MISSING_T,), delivery=_late(TEMPERATURE_ID)),
     PackFault("voltage page too short", 0, (MISSING_V,), delivery=_short),
     PackFault("voltage page from two senders", 2, (CORRUPTED,), delivery=_twice),
     PackFault("page of cells that are not there", 2, (CORRUPTED,), delivery=_unknown_page),

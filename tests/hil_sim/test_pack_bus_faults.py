@@ -57,6 +57,14 @@ def test_the_page_of_any_cell_is_missed(cell):
     assert result.faulty_cell == 3 * page + 1
 
 
+@pytest.mark.parametrize("kind", ["voltage", "temperature"])
+def test_a_page_that_comes_late_is_missing_for_a_family_as_well(kind):
+    """Its observer asks for no estimate, so nothing else ends a charge by old temperatures."""
+    (fault,) = [one for one in FAULTS if one.name == f"{kind} page a period late"]
+    settings = PackChargeSettings(*load_pair("a123_26650_10C", None), 6)
+    assert complaint(run_fault(settings, fault, 10), fault) is None
+
+
 def test_one_lost_page_stops_for_its_period_and_the_charge_goes_on_where_it_was():
     """A charge that began anew would take the states of charge at plug-in over again."""
 
@@ -103,6 +111,31 @@ def test_an_ecu_that_restarts_in_mid_charge_begins_none_whenever_it_hears_the_re
         assert period < 100 or heard.command_A == 0.0 or np.isnan(heard.command_A)
 
 
+@pytest.mark.parametrize("off_periods", [1, 2, 4])
+def test_a_charge_that_is_asked_for_anew_counts_from_states_of_charge_that_were_told_since(
+    off_periods,
+):
+    """96 cells are told in five periods; until then no cell is taken for what it was before."""
+    settings = settings_of(96)
+    plant = PackPlant(settings)
+    ecu, wire = PackEcu(settings), PackWire(settings, plant)
+    told = plant.socs()
+    for period in range(150):
+        plant.measure()
+        if period == 100:
+            assert plant.current_A < -1.0
+            told = plant.socs()
+            for cell, soc in enumerate(told):
+                wire._socs[cell] = soc
+        heard = wire.hear(
+            ecu.exchange(wire.publish(20 < period < 100 or period >= 100 + off_periods))
+        )
+        if period >= 100 + off_periods and heard.command_A < 0.0:
+            counted = [ecu.state.pack.cell[cell].soc.soc for cell in range(96)]
+            np.testing.assert_array_less(np.array(told) - 1e-4, counted)
+        plant.hold(obeyed_A(heard))
+
+
 def test_two_commands_in_one_period_move_no_current():
     """The charger's side: the protection proves no sender."""
     ecu, plant = PackEcu(settings_of()), PackPlant(settings_of())
@@ -145,14 +178,8 @@ def test_exchanged_thermistors_are_not_seen_and_change_the_name_of_the_cell_but_
 
 NETWORK, ECU = "firmware_c/pack_ecu/pack_network.c", "firmware_c/pack_ecu/pack_ecu.c"
 SYMPTOMS, E2E = "firmware_c/pack/pack_symptoms.c", "firmware_c/src/e2e.c"
-AGE = [
-    (NETWORK, "((receiver->good_periods & 1u) == 0u)", "false"),
-    (
-        NETWORK,
-        "            forget_page(ecu, group, page);\n            if (ecu->missing",
-        "            if (ecu->missing",
-    ),
-]
+AGE = (NETWORK, "(!verdict.is_usable || is_late(ecu, group, page))", "(is_late(ecu, group, page))")
+LATE = (NETWORK, "(phase_of(ecu, group, page) != ecu->phase[group][page])", "false")
 CRC = (E2E, "data[0] != e2e_crc(data, length, data_ids)", "false")
 SUM = (NETWORK, "is_electrical && sum_deviates(ecu)", "false")
 
@@ -165,7 +192,7 @@ def unlimited(reading, limits, fault):
 MUTANTS = {
     # A page that does not come is a symptom, and leaves its cells without readings.
     "age of pages": (
-        AGE,
+        [AGE, LATE],
         ["voltage page missing", "temperature page missing", "voltage page too short"],
     ),
     "checksum": (
@@ -174,12 +201,17 @@ MUTANTS = {
     ),
     # Such a page is missed under its own number as well.
     "number of a page": (
-        [CRC, *AGE],
+        [CRC, AGE, LATE],
         ["voltage page under another's number"],
     ),
     "counter": (
-        [(E2E, "(steps == 0u) ||", "")],
+        [(E2E, "(steps == 0u) ||", ""), LATE],
         ["voltage page frozen", "temperature page frozen", "voltage page from two senders"],
+    ),
+    # What has fallen behind counts on by one, as if all were well.
+    "phase of counters": (
+        [LATE],
+        ["voltage page a period late", "temperature page a period late"],
     ),
     "number of cells": (
         [(NETWORK, "ecu->is_disturbed = true;\n        return true;", "return true;")],

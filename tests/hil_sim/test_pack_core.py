@@ -138,6 +138,8 @@ def soc_set(loop, index, soc):
         (193, [NO_THERMISTOR] * 193, 1),
         (2, [0, 0], 1),  # two cells by one thermistor
         (2, [0, 2], 2),  # a thermistor that is none
+        (2, [0, 1], 3),  # a thermistor that is at no cell
+        (2, [0, 1], 300),  # more than a pack has room for
         (2, [NO_THERMISTOR] * 2, 0),  # nothing is measured
     ],
 )
@@ -172,7 +174,7 @@ def state_of(preset, bare, cells, map_, thermistors):
     }
     lib.pack_init(pack, ffi.new("pack_config_t *", config))
     start = core.preset.initial
-    many = max(cells, 1)
+    many = max(cells, thermistors, 1)
     arrays = [
         ffi.new("float[]", [value] * many)
         for value in (core.preset.cell.ocv(start.soc), start.temperature_K, start.soc)

@@ -10,7 +10,8 @@ import math
 from bms.barrier.readings import reading_errors
 from bms.cell import CellFactors, scaled
 from bms.presets import Preset
-from hil_sim.studies.pack.reserves import ESTIMATE_ERROR_K, greatest_heat_W
+from hil_sim.studies.pack.coupling import greatest_heat_W
+from hil_sim.studies.pack.reserves import ESTIMATE_ERROR_K
 from hil_sim.studies.pack.spread import Spread, Surroundings
 
 SOON_S = 10.0
