@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
 from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
+from bms.commands import options
 from bms.commands.family_tables import print_family
 from bms.errors import InputError
 from bms.model.model_file import KanModel
@@ -47,12 +47,12 @@ BoxesOption = Annotated[
 
 
 def verify(
-    preset: str = DEFAULT_PRESET,
-    model: Path | None = None,
-    formulas: Formulas = Formulas.CORRECTED,
-    slips: bool = False,
-    boxes: int = LARGEST_BOXES,
-    as_json: bool = False,
+    preset: options.PresetOption = DEFAULT_PRESET,
+    model: options.ModelOption = None,
+    formulas: FormulasOption = Formulas.CORRECTED,
+    slips: SlipsOption = False,
+    boxes: BoxesOption = LARGEST_BOXES,
+    as_json: options.JsonOption = False,
 ) -> int:
     """What `bms verify` does for one cell; the exit code."""
     pair = load_pair(preset, model)

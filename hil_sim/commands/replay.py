@@ -13,10 +13,13 @@ from bms.cli import EXIT_CHECK_FAILED, EXIT_DONE
 from bms.commands.options import JsonOption, model_option, preset_option
 from bms.errors import InputError
 from bms.firmware import Ecu
+from bms.presets import DEFAULT_PRESET
 from bms.waiting import waiting
+from hil_sim.commands import pack_options
 from hil_sim.commands.options import ChannelOption, DeltaTimesOption
 from hil_sim.commands.replay_output import ReplayReport, builds_json, print_builds
 from hil_sim.logs import Selection, usable_format
+from hil_sim.pack.spread_kind import SpreadKind
 from hil_sim.replay.builds import compare_builds, logs_in
 from hil_sim.replay.comparison import compare
 from hil_sim.replay.content import foreign_content_of
@@ -60,17 +63,30 @@ def replay(
     channel: ChannelOption = None,
     delta_times: DeltaTimesOption = False,
     as_json: JsonOption = False,
+    cells: pack_options.CellsOption = None,
+    spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
+    per_thermistor: pack_options.PerThermistorOption = 1,
 ) -> int:
     """Feed the frames of a log to the firmware in virtual time and compare its decisions.
 
     Shows the first period in which what the ECU sends differs from the log, with measurements and
     both sides' estimate, interval, margins and state, then the largest difference of each signal.
     What is in the log besides classical data frames is counted. Exit code 1 when anything differs,
-    2 when a log cannot be used.
+    2 when a log cannot be used. With --cells it is the log of a pack, in lock step.
 
     Example: bms replay out/run/can.log
     """
     selection = Selection(channel, delta_times)
+    if cells is not None:
+        pack_options.refuse_options({"--out": out is not None, "--against": against is not None})
+        from hil_sim.commands.pack_charge import pack_settings  # noqa: PLC0415 (only for a pack)
+        from hil_sim.commands.pack_replay import replay_and_print  # noqa: PLC0415
+
+        settings = pack_settings(
+            preset or DEFAULT_PRESET, model, cells, "virtual:bms", spread, per_thermistor
+        )
+        return replay_and_print(log, settings, selection, as_json)
+    pack_options.refuse_pack_options(spread, per_thermistor)
     if against is not None:
         if out is not None:
             raise InputError("--out: there are two answers with --against; leave one of them out")
