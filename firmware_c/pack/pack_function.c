@@ -10,7 +10,7 @@
 /* Halvings of the strongest current that is ever allowed: to 1/4096 of it. */
 #define HALVINGS 12u
 
-bool pack_horizon_is_valid(const pack_horizon_t *horizon)
+static bool horizon_is_valid(const pack_horizon_t *horizon)
 {
     const float numbers[] = {
         horizon->core_above_estimate_K, horizon->core_K_per_W,
@@ -103,7 +103,7 @@ static bool may_charge(const pack_t *pack)
 float pack_function_A(const pack_t *pack, const pack_worst_t *worst,
                       const pack_horizon_t *horizon)
 {
-    if (!may_charge(pack) || !pack_horizon_is_valid(horizon)) {
+    if (!may_charge(pack) || !horizon_is_valid(horizon)) {
         return 0.0f;
     }
     float refused_A = -pack->calibration->reference_current_A;

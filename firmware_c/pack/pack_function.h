@@ -39,8 +39,6 @@ typedef struct {
     float coolant_K;
 } pack_worst_t;
 
-bool pack_horizon_is_valid(const pack_horizon_t *horizon);
-
 pack_worst_t pack_worst(const pack_t *pack);
 
 /* Strongest current, 0 A or negative, after a period of the pack whose worst cell is given. 0 A where the pack may not charge

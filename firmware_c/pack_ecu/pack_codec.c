@@ -51,8 +51,9 @@ uint64_t pack_with_value(uint32_t signal, float value, codec_rounding_t rounding
 
 /* The generator has it so: identifiers of a group follow each other, and values are whole bytes. */
 #define PAGE_BYTE (PACK_PAGE_START / 8)
-#define PAGE_SHIFT (PACK_PAGE_START % 8)
+#define PAGE_SHIFT 4u
 #define FIRST_VALUE_BYTE (PACK_VALUE_START / 8)
+typedef char page_is_a_half_byte[(PACK_PAGE_START % 8 == 4) ? 1 : -1];
 typedef char values_are_two_bytes[((PACK_VALUE_LENGTH == 16) && (PACK_VALUE_START % 8 == 0) &&
                                    (PACK_VALUE_START == 8 * (PAGE_BYTE + 1)))
                                       ? 1

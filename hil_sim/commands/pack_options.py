@@ -41,6 +41,21 @@ FlowOption = Annotated[
     ),
 ]
 
+BleedOption = Annotated[
+    float,
+    typer.Option(
+        "--bleed-ohm",
+        min=0.0,
+        help="Balancing resistor across each cell, 0 for none; with --cells.",
+    ),
+]
+BalanceOption = Annotated[
+    float,
+    typer.Option(
+        "--balance-s", min=0.0, help="Time for which a full pack stays plugged in; with --cells."
+    ),
+]
+
 
 def refuse_options(given: Mapping[str, bool]) -> None:
     """Raise InputError for the first option that is given and means one cell only."""
@@ -53,3 +68,9 @@ def refuse_pack_options(spread: SpreadKind, per_thermistor: int) -> None:
     """Raise InputError for an option that means a pack, without --cells."""
     if spread is not SpreadKind.PUBLISHED or per_thermistor != 1:
         raise InputError("--spread, --per-thermistor: are for a pack; add --cells")
+
+
+def refuse_balancing(bleed_ohm: float, balance_s: float) -> None:
+    """Raise InputError for an option that means a pack, without --cells."""
+    if bleed_ohm != 0.0 or balance_s != 0.0:
+        raise InputError("--bleed-ohm, --balance-s: are for a pack; add --cells")

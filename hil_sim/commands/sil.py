@@ -54,6 +54,8 @@ def sil(
     cells: pack_options.CellsOption = None,
     spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
     per_thermistor: pack_options.PerThermistorOption = 1,
+    bleed_ohm: pack_options.BleedOption = 0.0,
+    balance_s: pack_options.BalanceOption = 0.0,
 ) -> int:
     """Charge a simulated cell over a CAN bus with the ECU in the same process.
 
@@ -86,8 +88,10 @@ def sil(
         chosen = pack_charge.pack_settings(
             preset, model, cells, bus, spread, per_thermistor, seed, max_time_s
         )
+        chosen = replace(chosen, bleed_ohm=bleed_ohm, balance_s=balance_s)
         return pack_charge.sil_pack(chosen, out, as_json, log)
     pack_options.refuse_pack_options(spread, per_thermistor)
+    pack_options.refuse_balancing(bleed_ohm, balance_s)
     with ExitStack() as stack:
         if target is not None:
             if bus != Settings.bus:

@@ -60,6 +60,8 @@ def summary(result: PackResult) -> dict[str, Any]:
         "max_voltage_V": float(result.peaks[:, 3].max()),
         "fullest_soc": max(result.final_socs),
         "emptiest_soc": min(result.final_socs),
+        "spread_when_full": _spread(result.full_socs),
+        "spread_at_end": _spread(result.final_socs),
         "counted_fullest_soc": result.counted_soc[1] if result.counted_soc else None,
         "counted_emptiest_soc": result.counted_soc[0] if result.counted_soc else None,
         "weakest_cell": max(result.governed, key=lambda c: (result.governed[c], -c), default=None),
@@ -76,6 +78,10 @@ def summary(result: PackResult) -> dict[str, Any]:
         "wall_time_s": result.wall_time_s,
         "times_real_time": result.steps * period_s / result.wall_time_s,
     }
+
+
+def _spread(socs: list[float]) -> float | None:
+    return max(socs) - min(socs) if socs else None
 
 
 def fault_name(fault: int) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import shutil
 import subprocess
@@ -209,6 +210,25 @@ def test_a_resistor_that_is_stuck_on_crosses_no_limit():
     assert (peaks[:, 3] <= PRESET.limits.max_voltage_V).all()
     assert (peaks[:, 0] <= PRESET.limits.max_soc).all()
     assert rig.heard.command_A == 0.0
+
+
+def test_the_command_balances_and_says_the_spread_before_and_after(bms, tmp_path):
+    """From empty: what capacities make of the spread is not counted, and stays."""
+    options = ["--cells", 4, "--seed", 1, "--bleed-ohm", 5, "--balance-s", 200]
+    code, out, _ = bms("sil", *options, "--out", tmp_path / "out", "--json")
+    said = json.loads(out)
+    assert (code, said["stop_reason"]) == (0, "complete")
+    assert 0.0 < said["spread_at_end"] < said["spread_when_full"] - 0.002
+    assert said["counted_fullest_soc"] - said["counted_emptiest_soc"] < 0.002
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert f"{said['spread_when_full']:.4f} when it was full" in page
+
+
+@pytest.mark.parametrize("option", ["--bleed-ohm", "--balance-s"])
+def test_balancing_one_cell_is_refused_in_one_line(bms, option):
+    code, out, err = bms("sil", option, 10)
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    assert "add --cells" in err
 
 
 BALANCE = "firmware_c/pack_ecu/pack_balance.c"

@@ -16,7 +16,7 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,9 +32,15 @@ RECORD = ROOT / "tools" / "gates" / "misra.toml"
 AREAS = {
     "core": ("src", "image", "boot", "include"),
     "ports": ("port", "port/linux", "port/cortex_m"),
+    "packs": ("pack", "pack_ecu"),
 }
 """Folders of firmware_c by the name that the record has for them together."""
-INCLUDED = ("include", "src", "generated", "image", "boot", "port", "port/linux")
+TOGETHER = (("core", "ports"), ("packs",))
+"""Areas that are one program: what is said of names in several files is said within each."""
+INCLUDED = (
+    *("include", "src", "generated", "image", "boot", "port", "port/linux"),
+    *("pack", "pack/generated", "pack_ecu"),
+)
 _LINE = re.compile(r"(?P<file>[^:]+):(?P<line>\d+): \w+ (?P<rule>[\w.-]+)$")
 _MISRA = "misra-c2012-"
 
@@ -50,24 +56,29 @@ class Violation:
 
 def violations(tree: Path) -> list[Violation]:
     """What cppcheck finds in the sources of tree/firmware_c; CalledProcessError when it fails."""
+    found = {one for areas in TOGETHER for one in _violations_of(tree, areas)}
+    return sorted(found, key=lambda v: (v.rule, v.source, v.line))
+
+
+def _violations_of(tree: Path, areas: Iterable[str]) -> Iterator[Violation]:
     core = tree / "firmware_c"
-    folders = [core / folder for area in AREAS.values() for folder in area]
+    folders = [core / folder for area in areas for folder in AREAS[area]]
     sources = [str(path) for folder in folders for path in sorted(folder.glob("*.c"))]
+    if not sources:
+        return
     command = ["cppcheck", "--addon=misra", "--std=c99", "-j", "2", "--quiet", "--template"]
     command += ["{file}:{line}: {severity} {id}", "--enable=warning,style,performance,portability"]
     command += ["--suppress=missingIncludeSystem", "--suppress=*:*/generated/*"]
     command += [f"-I{core / folder}" for folder in INCLUDED]
     done = subprocess.run([*command, *sources], check=True, capture_output=True, text=True)
-    found = set()
     for line in done.stderr.splitlines():
         match = _LINE.match(line)
         if match is None:
             continue
         source = Path(match["file"]).resolve().relative_to(tree.resolve()).as_posix()
-        if "/generated/" not in source:
+        if "/generated/" not in source and area_of(source) in areas:
             rule = match["rule"].removeprefix(_MISRA)
-            found.add(Violation(source, int(match["line"]), rule))
-    return sorted(found, key=lambda v: (v.rule, v.source, v.line))
+            yield Violation(source, int(match["line"]), rule)
 
 
 def area_of(source: str) -> str:
