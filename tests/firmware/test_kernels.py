@@ -14,7 +14,10 @@ from tests.firmware.native.build import ROOT, build_program
 from tests.firmware.native.kernels import compare, shipped_blocks
 
 STATES = 100_000
-KERNELS = {"estimate", "decision", "open_circuit_voltage", "checksum", "family_table"}
+KERNELS = {
+    *("estimate", "decision", "open_circuit_voltage"),
+    *("checksum", "family_table", "family_decision"),
+}
 DECIDED_BY = ("none", "voltage", "soc", "core", "surface", "infeasible", "invalid")
 BLOCKS = dict(shipped_blocks())
 SHORTCUTS_TOO_SHORT = (
@@ -23,6 +26,7 @@ SHORTCUTS_TOO_SHORT = (
     ("rcbf.c", "(clamped <= start[1])", "(clamped <= start[1] + 1e-3f)"),
     ("e2e.c", "0x00u, 0x2Fu, 0x5Eu", "0x00u, 0x2Fu, 0x5Fu"),
     ("family_tables.c", "is_known = cells[i] < greatest;", "is_known = true;"),
+    ("family_decision.c", "!(left_at_W >= 0.0f)", "!(left_at_W >= -0.01f)"),
 )
 
 
@@ -55,6 +59,18 @@ def test_the_surface_and_the_state_of_charge_decide_somewhere(program: Path) -> 
     assert min(decided_by.values()) > 0.01 * STATES
 
 
+@pytest.mark.parametrize("name", ["a123_26650", "a123_26650_10C", "samsung_30q"])
+def test_a_family_s_decision_needs_no_solution_where_its_condition_holds(
+    program: Path, name: str
+) -> None:
+    """Where the entropic heat cools, a solution from 0 A up may leave out what fulfils it."""
+    said, _ = compare(program, BLOCKS[name], STATES, seed=3)
+    none, voltage, _, core, *_, mapped, unknown = said["family_decided_by"]
+    assert min(none, voltage, core, mapped, unknown) > 0.02 * STATES
+    assert said["family_stronger"] < 0.001 * STATES
+    assert said["differing"]["family_decision"] == 0
+
+
 def test_a_shortcut_that_is_too_short_is_found_in_every_kernel(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "firmware_c", tmp_path / "firmware_c")
     for name, right, wrong in SHORTCUTS_TOO_SHORT:
@@ -63,7 +79,7 @@ def test_a_shortcut_that_is_too_short_is_found_in_every_kernel(tmp_path: Path) -
         assert text.count(right) == 1, name
         source.write_text(text.replace(right, wrong), encoding="utf-8")
     program = build_program("kernels", tmp_path / "build", sanitize=False, tree=tmp_path)
-    said, first = compare(program, BLOCKS["a123_26650"], STATES, seed=1)
+    said, first = compare(program, BLOCKS["a123_26650_10C"], STATES, seed=1)
     assert set(said["differing"]) == KERNELS
     assert all(count > 0 for count in said["differing"].values()), said
     for kernel in KERNELS:

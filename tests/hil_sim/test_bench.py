@@ -228,6 +228,7 @@ def test_a_layer_is_charged_with_what_happens_below_it():
         state = CellState(0.5, 300.0, 300.0, 300.0)
         for _ in range(20_000):
             state = integrate_step(cell, state, -1.0, 1.0, 0.01)
+        layers.settle()
     assert layers.shares_percent["cell model"] > 80.0
 
 

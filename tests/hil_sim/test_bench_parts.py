@@ -98,6 +98,7 @@ def test_every_missed_aim_has_parts_that_add_up_to_it():
         assert REST in one.parts
         assert one.limit
     assert found["simulation on virtual:x, one process"].parts["cell model"] == 0.6 * 100_000.0
+    assert "had a core for 100000 us" in found["simulation on virtual:x, one process"].limit
     # 1,000 instructions in 500 ns; 250 ns are half of them.
     assert found["control period with frames in C"].wanted == pytest.approx(500.0)
 

@@ -47,20 +47,28 @@ class LayerCounts:
 
     def __init__(self) -> None:
         self._samples: Counter[str] = Counter()
+        self._unsettled: list[str] = []
 
     def note(self, frame: FrameType | None) -> None:
         """Count one sample of the stack for the innermost layer on it."""
         while frame is not None:
             layer = _layer_of(frame.f_code.co_filename, frame.f_code.co_name)
             if layer is not None:
-                self._samples[layer] += 1
+                self._unsettled.append(layer)
                 return
             frame = frame.f_back
-        self._samples[REST] += 1
+        self._unsettled.append(REST)
+
+    def settle(self) -> None:
+        """A period is over: what was sampled in it counts. What comes after the last does not."""
+        if self._unsettled:
+            self._samples.update(self._unsettled)
+            self._unsettled.clear()
 
     def forget(self) -> None:
         """Forget all samples, such as those from before the first answer."""
         self._samples.clear()
+        self._unsettled.clear()
 
     @property
     def shares_percent(self) -> dict[str, float]:

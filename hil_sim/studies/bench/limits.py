@@ -92,7 +92,8 @@ def _simulation(aim: Aim, speed: BusSpeed) -> Breakdown:
         wanted_us,
         parts,
         f"asked are {wanted_us:.0f} us; all but the bus takes {whole_us - bus_us:.0f} us, the bus "
-        f"with python-can {bus_us:.0f} us",
+        f"with python-can {bus_us:.0f} us; the plant's process had a core for "
+        f"{whole_us * speed.processor_share_percent / 100.0:.0f} us of all that",
     )
 
 

@@ -51,8 +51,14 @@ class BusSpeed:
 class _Pace:
     """Time from the first answered period to the last."""
 
-    def __init__(self, clocks: Clocks, begin: Callable[[], None] = lambda: None) -> None:
-        self._clocks, self._begin = clocks, begin
+    def __init__(
+        self,
+        clocks: Clocks,
+        begin: Callable[[], None] = lambda: None,
+        end: Callable[[], None] = lambda: None,
+    ) -> None:
+        """`begin` is called by the first answered period, `end` by each."""
+        self._clocks, self._begin, self._end = clocks, begin, end
         self._first_ns = self._last_ns = self._first_cpu_ns = 0
         self.periods = 0
 
@@ -61,6 +67,7 @@ class _Pace:
         if self.periods == 0:
             self._first_ns, self._first_cpu_ns = self._last_ns, self._clocks.cpu_ns()
             self._begin()
+        self._end()
         self.periods += 1
 
     def times_real_time(self, period_s: float) -> float:
@@ -104,7 +111,7 @@ def bus_speed(
             speeds.append(pace.times_real_time(settings.preset.timing.sampling_period_s))
             periods = pace.periods
         with sampled() as layers:
-            _charge(settings, preset, is_alone, _Pace(clocks, layers.forget))
+            _charge(settings, preset, is_alone, _Pace(clocks, layers.forget, layers.settle))
     except BusError as error:
         return BusSpeed(bus, processes, parties, 0, None, 0.0, {}, str(error))
     return BusSpeed(

@@ -13,7 +13,7 @@ HERE = Path(__file__).parent
 PARTS = {
     "fuzz": ("fuzz", "damage", "session"),
     "benchmark": ("benchmark", "session"),
-    "kernels": ("kernels", "plain_kernels"),
+    "kernels": ("kernels", "plain_kernels", "plain_family"),
 }
 WARNINGS = ("-pedantic", "-Wall", "-Wextra", "-Werror")
 

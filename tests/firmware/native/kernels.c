@@ -1,9 +1,8 @@
 /* The firmware's kernels against their plain forms on random states of one calibration, bit by bit.
  *
- * Inputs lie in and around the box of the model and the limits of the cell, on knots and beside
- * them, and now and then are no number, infinite, huge or tiny. Usage: kernels BLOCK STATES SEED,
- * where BLOCK is a file with the calibration. Prints how many states were tried of each kernel, how
- * many differ and the first that does; exit code 1 when one does.
+ * Inputs lie in and around box and limits, on knots and beside them; some are no number, infinite,
+ * huge or tiny. Usage: kernels BLOCK STATES SEED, with a calibration in BLOCK. Prints how many
+ * answers differ, and the first; exit code 1 when one does.
  */
 #include <float.h>
 #include <math.h>
@@ -19,10 +18,11 @@
 
 #define SPECIAL_OF_1024 8u
 #define NEW_START_OF_1024 4u
-#define KERNELS 5u
+#define KERNELS 6u
+#define STEP_K_PER_S 1e-6f /* rounding */
 
 static const char *const NAMES[KERNELS] = { "estimate", "decision", "open_circuit_voltage",
-                                            "checksum", "family_table" };
+                                            "checksum", "family_table", "family_decision" };
 
 typedef struct {
     bms_calibration_t calibration;
@@ -31,8 +31,13 @@ typedef struct {
     uint8_t segment;
     family_t family;
     float soc;
+    family_t cell; /* of the family, as the observer has it */
+    family_reading_t reading;
+    uint64_t stronger; /* decisions of a family than a solution for the core */
+    float most_stronger_A;
     uint64_t differing[KERNELS];
     uint64_t reached[RCBF_INVALID + 1]; /* decisions by what decided */
+    uint64_t family_reached[RCBF_CORE_UNKNOWN + 1];
     uint64_t in_domain;
 } trial_t;
 
@@ -141,7 +146,7 @@ static void try_decision(trial_t *trial)
         rcbf_steadier_reset(&trial->steadier[0]);
         rcbf_steadier_reset(&trial->steadier[1]);
     } else if (random_chance(random, 256u)) {
-        /* What would not bind by itself, so that all conditions get to decide. */
+        /* So that all conditions get to decide. */
         trial->steadier[0].core_K_per_s = number(random, -0.5f, 2.0f);
         trial->steadier[0].surface_K_per_s2 = number(random, -0.01f, 0.05f);
         trial->steadier[1] = trial->steadier[0];
@@ -162,7 +167,7 @@ static void try_decision(trial_t *trial)
     note(trial, 1u, is_same, &input.core_temperature_K.high_K, 9u);
 }
 
-/* States of charge that mostly change little, as from period to period. */
+/* Mostly near the last one. */
 static float next_soc(trial_t *trial)
 {
     random_t *random = &trial->random;
@@ -194,6 +199,89 @@ static void try_tables(trial_t *trial)
              same(trial->family.entropic_V_per_K,
                   plain_greatest(family->entropic_V_per_K, trial->soc, high)),
          &trial->soc, 1u);
+}
+
+/* Readings that wander, as from period to period; the observer follows them. */
+static void next_reading(trial_t *trial)
+{
+    random_t *random = &trial->random;
+    const bms_calibration_t *calibration = &trial->calibration;
+    const rcbf_constants_t *cell = &calibration->rcbf;
+    family_reading_t *reading = &trial->reading;
+    const float limit_K = cell->max_core_temperature_K.high_K;
+    if (random_chance(random, NEW_START_OF_1024)) {
+        const float soc = uniform(random, 0.0f, 1.0f);
+        const float at_K = uniform(random, limit_K - 40.0f, limit_K + 2.0f);
+        *reading = (family_reading_t){
+            .voltage_V = plain_open_circuit_voltage_V(cell, soc),
+            .surface_temperature_K = at_K,
+            .coolant_temperature_K = at_K,
+            .estimated_core_K = at_K,
+            .is_usable = true,
+        };
+        family_reset(&trial->cell, &calibration->family);
+        family_begin(&trial->cell, &calibration->family, cell, soc, reading);
+    }
+    reading->is_charging = random_chance(random, 900u);
+    if (reading->is_charging) {
+        reading->command_A = uniform(random, calibration->reference_current_A, 0.0f);
+        reading->current_A = reading->command_A * uniform(random, 0.98f, 1.02f);
+    } else if (random_chance(random, 512u)) {
+        reading->command_A = 0.0f;
+        reading->current_A = 0.0f;
+    }
+    reading->voltage_V += uniform(random, -0.01f, 0.0101f);
+    reading->surface_temperature_K += uniform(random, -0.1f, 0.11f);
+    reading->coolant_temperature_K += uniform(random, -0.1f, 0.1f);
+    reading->estimated_core_K = reading->surface_temperature_K + uniform(random, -1.0f, 6.0f);
+    family_observe(&trial->cell, &calibration->family, cell, reading);
+}
+
+static void try_family(trial_t *trial)
+{
+    if (trial->calibration.family.is_stated == 0u) {
+        return;
+    }
+    random_t *random = &trial->random;
+    next_reading(trial);
+    family_reading_t reading = trial->reading;
+    family_t known = trial->cell;
+    if (random_chance(random, 960u)) {
+        /* As after a rest, which would take many periods. */
+        known.core_is_known = true;
+        known.core_room_K = uniform(random, -0.5f, 20.0f);
+    }
+    if (random_chance(random, SPECIAL_OF_1024)) {
+        float *const of[] = { &reading.current_A, &reading.voltage_V,
+                              &reading.surface_temperature_K, &reading.coolant_temperature_K,
+                              &reading.estimated_core_K };
+        *of[random_below(random, 5u)] = special(random);
+    }
+    const float reference_A = number(random, 1.2f * trial->calibration.reference_current_A, 0.0f);
+    const family_constants_t *family = &trial->calibration.family;
+    const rcbf_constants_t *cell = &trial->calibration.rcbf;
+    const rcbf_decision_t quick =
+        family_decide(&known, family, cell, &reading, reference_A);
+    const rcbf_decision_t plain =
+        plain_family_decision(&known, family, cell, &reading, reference_A);
+    trial->family_reached[plain.active]++;
+    if ((quick.current_A <= plain.current_A) && (quick.active != RCBF_CORE) &&
+        (plain.active == RCBF_CORE)) {
+        /* The condition holds at the stronger current itself, so that it needs no solution. */
+        const float left_K_per_s = plain_family_core_left(&known, family, cell, &reading,
+                                                          reference_A, quick.current_A);
+        if (left_K_per_s >= -STEP_K_PER_S) {
+            trial->stronger++;
+            trial->most_stronger_A =
+                fmaxf(trial->most_stronger_A, plain.current_A - quick.current_A);
+            return;
+        }
+    }
+    note(trial, 5u,
+         same(quick.current_A, plain.current_A) && (quick.active == plain.active) &&
+             (quick.feasible == plain.feasible) && same(quick.margins[0], plain.margins[0]) &&
+             same(quick.margins[2], plain.margins[2]),
+         &reading.current_A, 5u);
 }
 
 static void try_checksum(trial_t *trial)
@@ -245,6 +333,7 @@ int main(int argc, char **argv)
         try_decision(&trial);
         try_tables(&trial);
         try_checksum(&trial);
+        try_family(&trial);
     }
     uint64_t all = 0u;
     printf("{\"states\": %llu, \"in_domain\": %llu, \"decided_by\": [", (unsigned long long)states,
@@ -252,7 +341,13 @@ int main(int argc, char **argv)
     for (uint32_t i = 0u; i <= RCBF_INVALID; i++) {
         printf("%s%llu", (i == 0u) ? "" : ", ", (unsigned long long)trial.reached[i]);
     }
-    printf("], \"differing\": {");
+    printf("], \"family_decided_by\": [");
+    for (uint32_t i = 0u; i <= RCBF_CORE_UNKNOWN; i++) {
+        printf("%s%llu", (i == 0u) ? "" : ", ", (unsigned long long)trial.family_reached[i]);
+    }
+    printf("], \"family_stronger\": %llu, \"most_stronger_A\": %.3g, "
+           "\"differing\": {",
+           (unsigned long long)trial.stronger, (double)trial.most_stronger_A);
     for (uint32_t i = 0u; i < KERNELS; i++) {
         all += trial.differing[i];
         printf("%s\"%s\": %llu", (i == 0u) ? "" : ", ", NAMES[i],

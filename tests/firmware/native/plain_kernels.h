@@ -21,4 +21,14 @@ uint8_t plain_crc(const uint8_t *data, uint8_t length, uint8_t data_id);
 /* Greatest value of a family's table where the state of charge may be, towards the next cell's. */
 float plain_greatest(const float *cells, float soc_low, float soc_high);
 
+/* Solves for the core whether or not it can decide. */
+rcbf_decision_t plain_family_decision(const family_t *family, const family_constants_t *constants,
+                                      const rcbf_constants_t *cell, const family_reading_t *in,
+                                      float reference_A);
+
+/* What the core's condition leaves at a current, in K/s. */
+float plain_family_core_left(const family_t *family, const family_constants_t *constants,
+                             const rcbf_constants_t *cell, const family_reading_t *in,
+                             float reference_A, float current_A);
+
 #endif
