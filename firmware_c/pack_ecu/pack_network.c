@@ -152,18 +152,19 @@ static uint8_t cell_of(const pack_ecu_t *ecu, uint32_t group, uint32_t index)
     return (uint8_t)index;
 }
 
-/* The messages of a period count together. One that has fallen behind in a queue is of the past,
- * though none of its frames is missing. */
-static uint8_t phase_of(const pack_ecu_t *ecu, uint32_t group, uint32_t page)
+/* The messages of a period count together. One that has fallen behind in a queue since the charge
+ * began is of the past, though none of its frames is missing. */
+static bool is_late(const pack_ecu_t *ecu, uint8_t *phase, uint8_t counter)
 {
     const uint8_t now = ecu->receiver[PACK_RECEIVED_ELECTRICAL].counter;
-    return (uint8_t)((ecu->page[group][page].counter - now) & (E2E_COUNTERS - 1u));
-}
-
-static bool is_late(const pack_ecu_t *ecu, uint32_t group, uint32_t page)
-{
-    return ecu->is_usable[PACK_RECEIVED_ELECTRICAL] &&
-           (phase_of(ecu, group, page) != ecu->phase[group][page]);
+    const uint8_t ahead = (uint8_t)((counter - now) & (E2E_COUNTERS - 1u));
+    if (!ecu->is_usable[PACK_RECEIVED_ELECTRICAL]) {
+        return false;
+    }
+    if (!is_charging(ecu)) {
+        *phase = ahead;
+    }
+    return ahead != *phase;
 }
 
 static void judge_pages(pack_ecu_t *ecu, uint32_t group)
@@ -174,10 +175,8 @@ static void judge_pages(pack_ecu_t *ecu, uint32_t group)
         const e2e_verdict_t verdict =
             e2e_supervise(&ecu->page[group][page], &pack_page_message(group, page)->policy);
         ecu->is_disturbed = ecu->is_disturbed || verdict.is_disturbed;
-        if (verdict.is_usable && ecu->is_usable[PACK_RECEIVED_ELECTRICAL] && !is_charging(ecu)) {
-            ecu->phase[group][page] = phase_of(ecu, group, page);
-        }
-        if (!verdict.is_usable || is_late(ecu, group, page)) {
+        if (!verdict.is_usable ||
+            is_late(ecu, &ecu->phase[group][page], ecu->page[group][page].counter)) {
             ecu->is_page_missing[group] = true;
             forget_page(ecu, group, page);
             if (ecu->missing_cell == PACK_NO_CELL) {

@@ -178,8 +178,8 @@ def test_exchanged_thermistors_are_not_seen_and_change_the_name_of_the_cell_but_
 
 NETWORK, ECU = "firmware_c/pack_ecu/pack_network.c", "firmware_c/pack_ecu/pack_ecu.c"
 SYMPTOMS, E2E = "firmware_c/pack/pack_symptoms.c", "firmware_c/src/e2e.c"
-AGE = (NETWORK, "(!verdict.is_usable || is_late(ecu, group, page))", "(is_late(ecu, group, page))")
-LATE = (NETWORK, "(phase_of(ecu, group, page) != ecu->phase[group][page])", "false")
+AGE = (NETWORK, "if (!verdict.is_usable ||\n            is_late(", "if (is_late(")
+LATE = (NETWORK, "return ahead != *phase;", "return false;")
 CRC = (E2E, "data[0] != e2e_crc(data, length, data_ids)", "false")
 SUM = (NETWORK, "is_electrical && sum_deviates(ecu)", "false")
 
