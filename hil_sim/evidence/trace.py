@@ -56,7 +56,8 @@ def _parsed(path: Path) -> Requirement:
             key, _, value = line.strip("- ").partition(": ")
             if line.startswith("- "):
                 entry = {}
-            entry[key] = value.strip("'")
+            # Within quotes a quote stands for itself where it stands twice.
+            entry[key] = value[1:-1].replace("''", "'") if value.startswith("'") else value
             if key == "path":
                 references.append(Reference(entry["path"], entry.get("keyword", "")))
     if not header or not references:

@@ -83,7 +83,7 @@ def _periods(log: Path, frames: Sequence[LogFrame]) -> Iterator[Period]:
     ):
         raise InputError(
             f"{log}: holds no pack in lock step, with SYNC and answers of its ECU; leave out "
-            "--cells for the log of one cell, or record one with 'bms sil --cells N --out DIR'"
+            "--cells for the log of one cell, or record one with 'bms sil --cells 16 --out DIR'"
         )
     waiting: list[Frame] = []
     answer: list[Frame] = []
