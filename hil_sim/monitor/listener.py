@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import socket
 from collections import deque
 from typing import Any
+
+from can.interfaces.socketcan import SocketcanBus
 
 from hil_sim.bus.batches import BatchBus
 from hil_sim.bus.buses import Frame, heard_on, open_interface
 from hil_sim.bus.closing import Closing
 from hil_sim.bus.foreign import ForeignFrame
+
+_RECEIVE_BUFFER_BYTES = 4 << 20
 
 # slcan: the adapter then does not even acknowledge frames.
 # socketcan: CAN FD frames are not delivered unless asked for.
@@ -23,6 +28,10 @@ class Listener(Closing):
         self.name = name
         self._bus = open_interface(name, **_OPTIONS.get(name.partition(":")[0], {}))
         self._batches = self._bus if isinstance(self._bus, BatchBus) else None
+        if isinstance(self._bus, SocketcanBus):
+            # Drawing takes long where the processor is slow; as much as the system allows.
+            option = socket.SO_RCVBUF
+            self._bus.socket.setsockopt(socket.SOL_SOCKET, option, _RECEIVE_BUFFER_BYTES)
         self._waiting = deque[Frame | ForeignFrame]()
 
     def receive(self, timeout_s: float) -> Frame | ForeignFrame | None:

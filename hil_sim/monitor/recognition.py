@@ -15,6 +15,7 @@ class BusModel:
     def __init__(self, cells: int | None = None) -> None:
         """With `cells` it is a pack of so many, whatever comes."""
         self._is_pack = cells is not None
+        self._is_one = False
         self._one = SystemModel(load_codecs())
         self._pack = PackModel(cells)
         self.frames = 0
@@ -22,13 +23,19 @@ class BusModel:
     def take(self, time_s: float, frame: Frame | ForeignFrame) -> None:
         """Count a frame and keep what it says."""
         self.frames += 1
-        self._one.take(time_s, frame)
-        self._pack.take(time_s, frame)
+        if not self._is_pack:
+            self._one.take(time_s, frame)
+        if not self._is_one:
+            self._pack.take(time_s, frame)
 
     def snapshot(self, now_s: float) -> Snapshot | PackSnapshot:
         """What is known at a time in s, not before that of the last frame."""
+        if self._is_pack:
+            return self._pack.snapshot(now_s)
         one = self._one.snapshot(now_s)
-        if self._is_pack or (self._pack.is_heard and not _is_heard(one)):
+        # A busy bus leaves no time for a second look at each frame.
+        self._is_one = self._is_one or _is_heard(one)
+        if self._pack.is_heard and not self._is_one:
             return self._pack.snapshot(now_s)
         return one
 
