@@ -157,7 +157,8 @@ static uint8_t cell_of(const pack_ecu_t *ecu, uint32_t group, uint32_t index)
 static bool is_late(const pack_ecu_t *ecu, uint8_t *phase, uint8_t counter)
 {
     const uint8_t now = ecu->receiver[PACK_RECEIVED_ELECTRICAL].counter;
-    const uint8_t ahead = (uint8_t)((counter - now) & (E2E_COUNTERS - 1u));
+    const uint8_t ahead =
+        (uint8_t)(((uint32_t)counter - (uint32_t)now) & (E2E_COUNTERS - 1u));
     if (!ecu->is_usable[PACK_RECEIVED_ELECTRICAL]) {
         return false;
     }
