@@ -69,10 +69,16 @@ static bool receive_page(pack_ecu_t *ecu, uint32_t group, const can_frame_t *fra
     return true;
 }
 
+/* Counts of a counter that wraps around. */
+static uint8_t steps_between(uint8_t from, uint8_t to)
+{
+    return (uint8_t)((to - from) & (E2E_COUNTERS - 1u));
+}
+
 /* A frame stands for the ones lost before it too, but for those of a sender that starts anew. */
 static void count_periods(pack_ecu_t *ecu, uint8_t last, uint8_t now)
 {
-    const uint8_t steps = (uint8_t)((now - last) & (E2E_COUNTERS - 1u));
+    const uint8_t steps = steps_between(last, now);
     const uint8_t most = PACK_RECEIVED[PACK_RECEIVED_ELECTRICAL].policy.max_delta_counter;
     const uint8_t periods = (steps <= most) ? steps : 1u;
     if (ecu->measured_periods <= UINT8_MAX - periods) {
@@ -157,8 +163,7 @@ static uint8_t cell_of(const pack_ecu_t *ecu, uint32_t group, uint32_t index)
 static bool is_late(const pack_ecu_t *ecu, uint8_t *phase, uint8_t counter)
 {
     const uint8_t now = ecu->receiver[PACK_RECEIVED_ELECTRICAL].counter;
-    const uint8_t ahead =
-        (uint8_t)(((uint32_t)counter - (uint32_t)now) & (E2E_COUNTERS - 1u));
+    const uint8_t ahead = steps_between(now, counter);
     if (!ecu->is_usable[PACK_RECEIVED_ELECTRICAL]) {
         return false;
     }
