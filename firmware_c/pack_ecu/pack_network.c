@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "numeric.h"
+#include "pack_cell.h"
 #include "pack_codec.h"
 
 typedef char groups_agree[((PACK_GROUP_CELL_VOLTAGES == 0) && (PACK_GROUP_CELL_TEMPERATURES == 1) &&
@@ -130,11 +131,6 @@ void pack_network_receive(pack_ecu_t *ecu, const can_frame_t *frame)
     }
 }
 
-static bool is_charging(const pack_ecu_t *ecu)
-{
-    return (ecu->pack.state == BMS_CHARGING) || (ecu->pack.state == BMS_DERATED);
-}
-
 static void forget_page(pack_ecu_t *ecu, uint32_t group, uint32_t page)
 {
     float *values = &values_of(ecu, group)[page * PACK_CELLS_A_PAGE];
@@ -167,7 +163,7 @@ static bool is_late(const pack_ecu_t *ecu, uint8_t *phase, uint8_t counter)
     if (!ecu->is_usable[PACK_RECEIVED_ELECTRICAL]) {
         return false;
     }
-    if (!is_charging(ecu)) {
+    if (!pack_is_charging(&ecu->pack)) {
         *phase = ahead;
     }
     return ahead != *phase;

@@ -66,11 +66,11 @@ def refuse_options(given: Mapping[str, bool]) -> None:
 
 def refuse_pack_options(spread: SpreadKind, per_thermistor: int) -> None:
     """Raise InputError for an option that means a pack, without --cells."""
-    if spread is not SpreadKind.PUBLISHED or per_thermistor != 1:
-        raise InputError("--spread, --per-thermistor: are for a pack; add --cells")
+    is_given = spread is not SpreadKind.PUBLISHED or per_thermistor != 1
+    refuse_without_cells("--spread, --per-thermistor", is_given)
 
 
-def refuse_balancing(bleed_ohm: float, balance_s: float) -> None:
-    """Raise InputError for an option that means a pack, without --cells."""
-    if bleed_ohm != 0.0 or balance_s != 0.0:
-        raise InputError("--bleed-ohm, --balance-s: are for a pack; add --cells")
+def refuse_without_cells(options: str, is_given: bool) -> None:
+    """Raise InputError where one of these options is given."""
+    if is_given:
+        raise InputError(f"{options}: are for a pack; add --cells")

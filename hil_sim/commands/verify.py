@@ -5,7 +5,6 @@ from __future__ import annotations
 from bms.commands.options import JsonOption, ModelOption, PresetOption
 from bms.commands.verify import BoxesOption, FormulasOption, SlipsOption
 from bms.commands.verify import verify as verify_cell
-from bms.errors import InputError
 from bms.presets import DEFAULT_PRESET
 from bms.verification import LARGEST_BOXES, Formulas
 from hil_sim.commands import pack_options
@@ -39,8 +38,8 @@ def verify(
     around = Surroundings(neighbour_W_per_K, flow_W_per_K)
     if cells is None:
         pack_options.refuse_pack_options(spread, per_thermistor)
-        if around != Surroundings():
-            raise InputError("--neighbour-w-per-k, --flow-w-per-k: are for a pack; add --cells")
+        is_around = around != Surroundings()
+        pack_options.refuse_without_cells("--neighbour-w-per-k, --flow-w-per-k", is_around)
         return verify_cell(preset, model, formulas, slips, boxes, as_json)
     from hil_sim.commands.pack_certificate import verify_pack  # noqa: PLC0415 (only for a pack)
 

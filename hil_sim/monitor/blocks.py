@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import get_args
+from typing import Protocol, get_args
 
 from rich.console import Group
 from rich.table import Table
@@ -34,33 +34,42 @@ _WRONG = "bold red"
 _SELDOM = (*get_args(OptionalName), Message.PLAN, Message.START, Message.BOOT_REFUSAL)
 
 
-def header(snapshot: Snapshot, bus: str) -> Table:
-    """State, bus, what sets the pace, and how to leave."""
-    reading = snapshot.readings["DiagnosticState"]
-    left = Text(f" {wording.state(snapshot)} ", f"bold {state_style(reading)}")
+class Paced(Protocol):
+    """What is known of when frames come; as a snapshot of a cell or of a pack has it."""
+
+    @property
+    def silence_s(self) -> float | None: ...
+    @property
+    def is_silent(self) -> bool: ...
+    @property
+    def is_lock_step(self) -> bool: ...
+
+
+def header(paced: Paced, state: str, reading: Reading, bus: str) -> Table:
+    """An ECU's state and its reading, bus, what sets the pace, and how to leave."""
+    left = Text(f" {state} ", f"bold {_state_style(reading)}")
     if reading.is_stale:
         left.append(" stale ", _WRONG)
     table = Table.grid(padding=(0, 2, 0, 0), expand=True)
     table.add_column(no_wrap=True)
     table.add_column(no_wrap=True, ratio=1)
     table.add_column(no_wrap=True)
-    table.add_row(left, Text.assemble(f"{bus}  ", _pace(snapshot)), Text("q quits", "dim"))
+    table.add_row(left, Text.assemble(f"{bus}  ", _pace(paced)), Text("q quits", "dim"))
     return table
 
 
-def state_style(reading: Reading) -> str:
-    """Colours of an ECU's state."""
+def _state_style(reading: Reading) -> str:
     if reading.is_stale:
         return _OTHER_STATE_STYLE
     return _STATE_STYLES.get(reading.value, _OTHER_STATE_STYLE)
 
 
-def _pace(snapshot: Snapshot) -> Text:
-    if snapshot.silence_s is None:
+def _pace(paced: Paced) -> Text:
+    if paced.silence_s is None:
         return Text("waiting for frames", "yellow")
-    if snapshot.is_silent:
-        return Text(f"silent for {wording.duration(snapshot.silence_s)}", _WRONG)
-    return Text("lock step (SYNC)" if snapshot.is_lock_step else "real time (no SYNC)")
+    if paced.is_silent:
+        return Text(f"silent for {wording.duration(paced.silence_s)}", _WRONG)
+    return Text("lock step (SYNC)" if paced.is_lock_step else "real time (no SYNC)")
 
 
 def identity(snapshot: Snapshot, in_force: PresetInForce) -> Text:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
+
+from cantools.database.can import Database
 
 from bms.presets import Preset
 from codegen import can_database
@@ -111,11 +114,18 @@ class PageCodec(MessageCodec):
         return {s.name: s.physical(raw[s.name]) for s in self.signals if s.name in raw}
 
 
-def pack_codecs() -> dict[str, MessageCodec]:
+@cache
+def pack_database() -> Database:
+    """The pack's database, whose many signals take long to parse."""
+    return can_database.load_database(can_database.PACK)
+
+
+@cache
+def pack_codecs() -> Mapping[str, MessageCodec]:
     """Every message of the pack's database by name."""
     return {
         message.name: (PageCodec if message.is_multiplexed() else MessageCodec)(message)
-        for message in can_database.load_database(can_database.PACK).messages
+        for message in pack_database().messages
     }
 
 
@@ -124,7 +134,7 @@ class PackModel:
 
     def __init__(self, cells: int | None = None) -> None:
         """`cells` is how many the pack is said to have; None: what its ECU or charger says."""
-        parsed = can_database.load_database(can_database.PACK)
+        parsed = pack_database()
         codecs = pack_codecs()
         self._given = cells
         self._version = can_database.network_version(parsed)

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from bms.presets import Preset
 from hil_sim.monitor import wording
-from hil_sim.monitor.blocks import state_style
+from hil_sim.monitor.blocks import header
 from hil_sim.monitor.model import Reading
 from hil_sim.monitor.pack_model import CellState, PackSnapshot
 from hil_sim.monitor.presets import PresetInForce
@@ -37,34 +37,13 @@ class PackScreen:
         rows = max(_LEAST_CELLS, height - _OTHER_ROWS)
         snapshot, preset = self.snapshot, self.in_force.preset
         yield Group(
-            _header(snapshot, self.bus),
+            header(snapshot, _state(snapshot), snapshot.readings["PackState"], self.bus),
             _identity(snapshot, self.in_force),
             _pack(snapshot, preset),
             _extremes(snapshot),
             _cells(snapshot, preset, rows),
             _faults(snapshot),
         )
-
-
-def _header(snapshot: PackSnapshot, bus: str) -> Table:
-    reading = snapshot.readings["PackState"]
-    left = Text(f" {_state(snapshot)} ", f"bold {state_style(reading)}")
-    if reading.is_stale:
-        left.append(" stale ", _WRONG)
-    table = Table.grid(padding=(0, 2, 0, 0), expand=True)
-    table.add_column(no_wrap=True)
-    table.add_column(no_wrap=True, ratio=1)
-    table.add_column(no_wrap=True)
-    table.add_row(left, Text.assemble(f"{bus}  ", _pace(snapshot)), Text("q quits", "dim"))
-    return table
-
-
-def _pace(snapshot: PackSnapshot) -> Text:
-    if snapshot.silence_s is None:
-        return Text("waiting for frames", "yellow")
-    if snapshot.is_silent:
-        return Text(f"silent for {wording.duration(snapshot.silence_s)}", _WRONG)
-    return Text("lock step (SYNC)" if snapshot.is_lock_step else "real time (no SYNC)")
 
 
 def _identity(snapshot: PackSnapshot, in_force: PresetInForce) -> Text:

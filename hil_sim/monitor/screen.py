@@ -9,7 +9,7 @@ from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderR
 from rich.layout import Layout
 from rich.panel import Panel
 
-from hil_sim.monitor import blocks
+from hil_sim.monitor import blocks, wording
 from hil_sim.monitor.gauges import gauges
 from hil_sim.monitor.model import Snapshot
 from hil_sim.monitor.presets import PresetInForce
@@ -72,7 +72,13 @@ class Screen:
         snapshot = self.snapshot
         return {
             "header": Group(
-                blocks.header(snapshot, self.bus), blocks.identity(snapshot, self.in_force)
+                blocks.header(
+                    snapshot,
+                    wording.state(snapshot),
+                    snapshot.readings["DiagnosticState"],
+                    self.bus,
+                ),
+                blocks.identity(snapshot, self.in_force),
             ),
             "cell": gauges(snapshot, self.in_force.preset),
             "decision": blocks.decision(snapshot),

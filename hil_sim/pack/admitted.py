@@ -9,9 +9,8 @@ import numpy as np
 from bms.arrays import Array
 from hil_sim.pack.plant import PackPlant
 from hil_sim.pack.settings import PackChargeSettings
-from hil_sim.pack.summary import limits_of
 from hil_sim.studies.pack._pack import ffi, lib
-from hil_sim.studies.pack.engine import SUB_STEPS
+from hil_sim.studies.pack.engine import SUB_STEPS, peak_limits
 
 _HALVINGS = 12
 
@@ -21,7 +20,7 @@ class Ahead:
 
     def __init__(self, settings: PackChargeSettings, plant: PackPlant, time_s: float) -> None:
         self._plant = plant
-        self._limits = limits_of(settings.preset)
+        self._limits = peak_limits(settings.preset)
         self._strongest_A = settings.preset.limits.reference_current_A
         self._cells = ffi.new("plant_cell_t[]", settings.cells)
         self._copy: Any = ffi.new("plant_t *")

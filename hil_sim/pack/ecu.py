@@ -9,7 +9,6 @@ from hil_sim.bus.frame import Frame
 from hil_sim.pack.frames import FRAME, packed, unpacked
 from hil_sim.pack.settings import PackChargeSettings
 from hil_sim.studies.pack._pack import ffi, lib
-from hil_sim.studies.pack.engine import NO_THERMISTOR
 
 _MOST_KEPT_BYTES = 300 * FRAME.size
 
@@ -21,10 +20,7 @@ class PackEcu:
         """Raises InputError or ModelMismatchError as PackChargeSettings.core does."""
         self._core = settings.core()  # C points to its calibration
         owners = settings.view.thermistors
-        places = {cell: place for place, cell in enumerate(owners)}
-        kept_map = ffi.new(
-            "uint8_t[]", [places.get(i, NO_THERMISTOR) for i in range(settings.cells)]
-        )
+        kept_map = ffi.new("uint8_t[]", settings.view.thermistor_of)
         self.state: Any = ffi.new("pack_ecu_t *")
         now, soon = settings.horizons()
         config = {

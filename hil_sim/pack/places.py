@@ -31,12 +31,10 @@ _TIMEOUT_S = 120.0
 
 def recording(settings: PackChargeSettings, periods: Sequence[Period]) -> bytes:
     """What pack_answers.c reads: the ECU's configuration, then frames, a SYNC for each period."""
-    core, owners = settings.core(), settings.view.thermistors
-    places = {cell: place for place, cell in enumerate(owners)}
-    owner_of = [places.get(i, NO_THERMISTOR) for i in range(settings.cells)]
-    owner_of += [NO_THERMISTOR] * (lib.BMS_MAX_CELLS - settings.cells)
-    size = ffi.sizeof("bms_calibration_t")
-    heading = _HEADING.pack(size, settings.cells, len(owners), settings.pack_voltage_error_V)
+    core, view = settings.core(), settings.view
+    owner_of = view.thermistor_of + [NO_THERMISTOR] * (lib.BMS_MAX_CELLS - settings.cells)
+    size, count = ffi.sizeof("bms_calibration_t"), len(view.thermistors)
+    heading = _HEADING.pack(size, settings.cells, count, settings.pack_voltage_error_V)
     structures = [ffi.new("pack_bare_t *", core.reserves.bare)]
     structures += [ffi.new("pack_horizon_t *", one) for one in settings.horizons()]
     structures.append(ffi.new("pack_balance_t *", settings.balance()))

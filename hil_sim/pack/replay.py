@@ -12,7 +12,7 @@ from codegen import can_database
 from hil_sim.bus.catalog import CommandState
 from hil_sim.bus.frame import Frame
 from hil_sim.logs import LogFrame, Selection, read_log
-from hil_sim.monitor.pack_model import pack_codecs
+from hil_sim.monitor.pack_model import pack_codecs, pack_database
 from hil_sim.pack.ecu import PackEcu
 from hil_sim.pack.settings import PackChargeSettings
 
@@ -75,7 +75,7 @@ def replay_pack(log: Path, settings: PackChargeSettings, selection: Selection) -
 
 
 def _periods(log: Path, frames: Sequence[LogFrame]) -> Iterator[Period]:
-    messages = can_database.load_database(can_database.PACK).messages
+    messages = pack_database().messages
     said = frozenset(m.frame_id for m in messages if can_database.ECU in m.senders)
     sync_id = next(m.frame_id for m in messages if m.name == _SYNC)
     if not any(f.frame_id == sync_id for f in frames) or not any(

@@ -4,33 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from bms.arrays import Array
-from bms.presets import Preset
 from hil_sim.bus.catalog import FirstFault
 from hil_sim.pack.charge import PackResult
 from hil_sim.run.result import STOP_COMPLETE
+from hil_sim.studies.pack.engine import peak_limits
 
 KINDS = ("soc", "core_temperature_K", "surface_temperature_K", "voltage_V")
 
 
-def limits_of(preset: Preset) -> Array:
-    """Limits of KINDS."""
-    limits = preset.limits
-    return np.array(
-        [
-            limits.max_soc,
-            limits.max_core_temperature_K,
-            limits.max_surface_temperature_K,
-            limits.max_voltage_V,
-        ]
-    )
-
-
 def margins(result: PackResult) -> Any:
     """What each cell left of each limit at its worst, (cells, KINDS); below 0 it was crossed."""
-    return limits_of(result.settings.preset) - result.peaks
+    return peak_limits(result.settings.preset) - result.peaks
 
 
 def has_passed(result: PackResult) -> bool:

@@ -39,6 +39,12 @@ class View:
     thermistors: tuple[int, ...]
     is_mean: bool = False
 
+    @property
+    def thermistor_of(self) -> list[int]:
+        """Number of each cell's thermistor among `thermistors`; NO_THERMISTOR for none."""
+        numbers = {cell: number for number, cell in enumerate(self.thermistors)}
+        return [numbers.get(i, NO_THERMISTOR) for i in range(len(self.cells))]
+
 
 def all_cells(cells: int, per_thermistor: int = 1) -> View:
     """All cells, with a thermistor at the middle one of each group of so many."""
@@ -46,6 +52,19 @@ def all_cells(cells: int, per_thermistor: int = 1) -> View:
     middle = per_thermistor // 2
     groups = range(0, cells, per_thermistor)
     return View(every, tuple(min(first + middle, cells - 1) for first in groups))
+
+
+def peak_limits(preset: Preset, max_soc: float | None = None) -> Array:
+    """Limits of what PackCharge.peaks gives of each cell; `max_soc` in place of the preset's."""
+    limits = preset.limits
+    return np.array(
+        [
+            limits.max_soc if max_soc is None else max_soc,
+            limits.max_core_temperature_K,
+            limits.max_surface_temperature_K,
+            limits.max_voltage_V,
+        ]
+    )
 
 
 def one_cell(index: int) -> View:
@@ -95,9 +114,7 @@ class PackCharge:
                 for cell, state, rate in zip(pack.cells, pack.states, pack.disturbances)
             ],
         )
-        seen = 1 if view.is_mean else len(view.cells)
-        owners = [0] if view.is_mean else list(view.thermistors)
-        thermistor_of = [owners.index(i) if i in owners else NO_THERMISTOR for i in range(seen)]
+        thermistor_of = [0] if view.is_mean else view.thermistor_of
         socs = [pack.states[i].soc for i in view.cells]
         self._seen = ffi.new("uint8_t[]", list(view.cells))
         self._owners = ffi.new("uint8_t[]", [view.cells[i] for i in view.thermistors])
@@ -136,8 +153,8 @@ class PackCharge:
             "pack_config_t *",
             {
                 "calibration": core.calibration,
-                "cells": seen,
-                "thermistors": len(owners),
+                "cells": len(thermistor_of),
+                "thermistors": 1 if view.is_mean else len(view.thermistors),
                 "thermistor_of": kept_map,
                 "bare": core.reserves.bare,
             },

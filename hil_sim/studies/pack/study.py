@@ -18,6 +18,7 @@ from hil_sim.studies.pack.engine import (
     all_cells,
     mean_of_all,
     one_cell,
+    peak_limits,
     play,
 )
 from hil_sim.studies.pack.reserves import Reserves, reserves
@@ -83,15 +84,7 @@ def limits_of(settings: PackSettings) -> Array:
 
     A family's cell is full by its voltage; it is overfilled where a campaign says so too.
     """
-    limits = settings.preset.limits
-    return np.array(
-        [
-            OVERFILLED_SOC if settings.is_family else limits.max_soc,
-            limits.max_core_temperature_K,
-            limits.max_surface_temperature_K,
-            limits.max_voltage_V,
-        ]
-    )
+    return peak_limits(settings.preset, OVERFILLED_SOC if settings.is_family else None)
 
 
 def _run_pack(

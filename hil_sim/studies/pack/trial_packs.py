@@ -10,7 +10,7 @@ import numpy as np
 from bms.cell import CellFactors, CellState, Disturbance, scaled
 from bms.presets import Preset
 from hil_sim.studies.pack._pack import lib
-from hil_sim.studies.pack.engine import Core, PackCharge, View
+from hil_sim.studies.pack.engine import Core, PackCharge, View, peak_limits
 from hil_sim.studies.pack.spread import PackDraw, Spread, Surroundings, draw_pack
 
 DRAWN = 2
@@ -84,7 +84,7 @@ def _hot_beside_cold(preset: Preset, spread: Spread, cells: int) -> PackDraw:
 def _charged(
     charge: PackCharge, preset: Preset, cells: int, view: View, rng: np.random.Generator
 ) -> Trials:
-    limits, fields = preset.limits, charge.fields
+    fields = charge.fields
     bare = [i for i in range(cells) if i not in view.thermistors]
     above_K: list[float] | None = [] if bare else None
     width = 2 * cells + lib.PACK_SHARED_NORMALS
@@ -97,17 +97,9 @@ def _charged(
             above_K.append(min(b - t for b, t in zip(bounds_K, before_K)))
         charge.advance(rng.standard_normal((_LOOK_PERIODS - 1, width)))
     peaks = charge.peaks()
-    highest = np.array(
-        [
-            limits.max_soc,
-            limits.max_core_temperature_K,
-            limits.max_surface_temperature_K,
-            limits.max_voltage_V,
-        ]
-    )
     return Trials(
         packs=1,
-        cells_over=int((peaks > highest).any(axis=1).sum()),
+        cells_over=int((peaks > peak_limits(preset)).any(axis=1).sum()),
         not_full=int(charge.outcome != "complete"),
         coupling_K_per_s=float(fields.plant.most_surface_K_per_s),
         bare_surface_K=min(above_K) if above_K else None,
