@@ -1,9 +1,9 @@
 """What `bms bench` says of a figure's parts: they add up to it, and every missed aim has some."""
 
+import itertools
 import json
 import os
 import shutil
-import time
 
 import pytest
 
@@ -12,7 +12,14 @@ from bms.presets import DEFAULT_PRESET
 from hil_sim.studies.bench.aims import aims
 from hil_sim.studies.bench.board import board_flash
 from hil_sim.studies.bench.breakdown import REST, grouped, parts_with_rest
-from hil_sim.studies.bench.campaign_parts import CampaignParts, campaign_parts
+from hil_sim.studies.bench.campaign_parts import (
+    CELL_PART,
+    FIRMWARE_PART,
+    NOISE_PART,
+    WATCH_PART,
+    CampaignParts,
+    campaign_parts,
+)
 from hil_sim.studies.bench.counted import instructions_of_period, own_costs
 from hil_sim.studies.bench.limits import FUNCTIONS, MODULES, breakdowns
 from hil_sim.studies.bench.machine import this_machine
@@ -134,15 +141,21 @@ def test_without_valgrind_instructions_are_not_counted_and_the_remedy_is_told(mo
 
 
 def test_the_timed_parts_of_a_campaign_do_its_work_and_add_up():
-    """The rows are those of a worker; what the parts take is about what the whole takes."""
-    rows = []
-    parts = campaign_parts(DEFAULT_PRESET, 2, time.process_time_ns, lambda *two: rows.append(two))
+    """The rows are those of a worker; by a clock that counts its readings each span takes one."""
+    rows, readings = [], itertools.count()
+    parts = campaign_parts(DEFAULT_PRESET, 2, lambda: next(readings), lambda *two: rows.append(two))
     assert len(rows) == 2
     for expected, found in rows:
         assert str(found) == str(expected)
     assert parts.periods > 10_000
-    assert 0.3 < sum(parts.parts_ms.values()) / parts.whole_ms < 3.0
-    assert all(part_ms > 0.0 for part_ms in parts.parts_ms.values())
+    spans = {name: part_ms * 1e6 for name, part_ms in parts.parts_ms.items()}
+    blocks = spans[NOISE_PART]
+    assert blocks > 1.0
+    assert spans[CELL_PART] == pytest.approx(3.0)
+    assert spans[WATCH_PART] == pytest.approx(blocks - 1.0)
+    assert spans[FIRMWARE_PART] == pytest.approx(0.0)
+    # Set-up three times, the disturbance once more than the noise, three charges a block.
+    assert sum(spans.values()) == pytest.approx(3.0 + (blocks + 1.0) + blocks + 3.0 * blocks)
 
 
 def test_the_command_prints_parts_of_what_it_was_asked_for(bms):

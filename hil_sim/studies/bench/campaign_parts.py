@@ -30,11 +30,11 @@ from hil_sim.studies.campaign.settings import CampaignSettings
 from hil_sim.studies.campaign.worker import BLOCK_PERIODS, run_one
 
 _MS_PER_NS = 1e-6
-_CELL = "cells of the three charges"
+CELL_PART = "cells of the three charges"
 FIRMWARE_PART = "firmware, its frames and its readings"
-_WATCH = "watch over the error of the firmware's model"
+WATCH_PART = "watch over the error of the firmware's model"
 _BASELINES = "S-CBF and CC-CV with their readings"
-_DISTURBANCE, _NOISE = "disturbance, drawn and limited", "sensor noise, drawn"
+_DISTURBANCE, NOISE_PART = "disturbance, drawn and limited", "sensor noise, drawn"
 _SET_UP = "draw, set-up and row"
 
 
@@ -107,7 +107,7 @@ def _timed_run(
     pieces: list[tuple[Array, Array]] = []
     before = float(first[0, 2])
     while not all(one.is_over for one in charges.values()):
-        with times.of(_NOISE):
+        with times.of(NOISE_PART):
             normals = numbers.sensors.standard_normal((BLOCK_PERIODS, 5))
         with times.of(_DISTURBANCE):
             knots = blocks(BLOCK_PERIODS * SUB_STEPS)
@@ -149,8 +149,8 @@ def _attribute(times: _Times) -> None:
     ns = times.ns
     cells = {name: ns.pop(f"cell of {name}") for name in CONTROLLERS}
     unwatched, watched = ns.pop("unwatched"), ns.pop(FIRMWARE)
-    ns[_CELL] += sum(cells.values())
-    ns[_WATCH] += watched - unwatched
+    ns[CELL_PART] += sum(cells.values())
+    ns[WATCH_PART] += watched - unwatched
     ns[FIRMWARE_PART] += unwatched - cells.pop(FIRMWARE)
     for name, cell_ns in cells.items():
         ns[_BASELINES] += ns.pop(name) - cell_ns
