@@ -20,7 +20,7 @@ from bms import __version__
 from bms.errors import InputError
 from bms.firmware.image_header import FIRMWARE_VERSION
 from bms.native_build import ROOT
-from hil_sim.evidence.kept import GATES, LONG_CHECKS, KeptCheck
+from hil_sim.evidence.kept import GATES, LONG_CHECKS, KeptCheck, mutants_hash
 from hil_sim.evidence.trace import REQUIREMENTS, load_requirements
 
 if sys.version_info >= (3, 11):
@@ -257,16 +257,6 @@ def _mutants(root: Path) -> Iterator[Item]:
         yield Item(
             source, state, says, numbers, (MUTANTS, SURVIVORS), "" if state == CURRENT else remedy
         )
-
-
-def mutants_hash(root: Path, source: str) -> str:
-    """Hash of a source and of the core's headers, on which its mutants rest."""
-    digest = hashlib.sha256()
-    folders = ("include", "src", "image", "boot", "port", "port/linux")
-    headers = [h for f in folders for h in sorted((root / "firmware_c" / f).glob("*.h"))]
-    for path in (root / source, *headers):
-        digest.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
-    return digest.hexdigest()
 
 
 def _matrix(root: Path, long: Mapping[str, KeptCheck]) -> Iterator[Item]:

@@ -78,3 +78,13 @@ class KeptCheck:
         path = root / self.path
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+def mutants_hash(root: Path, source: str) -> str:
+    """Hash of a source and of the core's headers, on which its mutants rest."""
+    digest = hashlib.sha256()
+    folders = ("include", "src", "image", "boot", "port", "port/linux")
+    headers = [h for f in folders for h in sorted((root / "firmware_c" / f).glob("*.h"))]
+    for path in (root / source, *headers):
+        digest.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()

@@ -6,16 +6,13 @@ claim that nothing checks.
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
+from tests.firmware.mutants.forks import run_tests
 from tests.firmware.mutation import CompiledFirmware
-
-ROOT = Path(__file__).parents[2]
 
 
 @dataclass(frozen=True)
@@ -122,7 +119,5 @@ def test_broken_claim_is_noticed(
     mutant: Mutant, firmware: CompiledFirmware, tmp_path: Path
 ) -> None:
     build = firmware.variant(mutant.source, mutant.old, mutant.new, tmp_path / "out")
-    run = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist"]
-    run += [mutant.tests, "--firmware-build", str(build), "-k", mutant.only]
-    result = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert result.returncode == 1, f"survived: {mutant.claim}\n{result.stdout[-2000:]}"
+    result = run_tests(build, ["-x", mutant.tests, "-k", mutant.only], tmp_path / "output")
+    assert result.code == 1, f"survived: {mutant.claim}\n{result.output[-2000:]}"

@@ -22,9 +22,8 @@ from hil_sim.evidence.collect import (
     STALE,
     Item,
     collect,
-    mutants_hash,
 )
-from hil_sim.evidence.kept import GATES, LONG_CHECKS, KeptCheck
+from hil_sim.evidence.kept import GATES, LONG_CHECKS, KeptCheck, mutants_hash
 from hil_sim.evidence.page import archive, numbers, page
 from hil_sim.evidence.trace import load_requirements
 from tests.hil_sim.command_line import bms

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bms.native_build import FIRMWARE, FLAGS, ROOT
-from hil_sim.evidence.collect import mutants_hash
+from hil_sim.evidence.kept import mutants_hash
 from tests.firmware.mutants.generate import Mutant, mutants_of
 from tests.firmware.mutation import MODULE_PATH, CompiledFirmware
 from tests.firmware.native_library import FOLDERS

@@ -41,9 +41,14 @@ else:
 HERE = Path(__file__).parent
 KEPT = ROOT / "build" / "mutants.json"
 LEFT_OUT = "not mutant and not emulat and not taken_away and not broken_rule"
+_NOT_RUN = (
+    pytest.ExitCode.INTERNAL_ERROR,
+    pytest.ExitCode.USAGE_ERROR,
+    pytest.ExitCode.NO_TESTS_COLLECTED,
+)
 NO_KEYS: frozenset[str] = frozenset()
-_PROFILE = "mutants"
-_HEAVY = (
+PROFILE = "mutants"
+HEAVY = (
     *("numpy", "scipy.optimize", "scipy.sparse", "cantools.autosar", "can", "osqp", "pydantic"),
     *("bms.model.pair", "bms.calibration", "codegen.can_database"),
 )
@@ -75,16 +80,24 @@ class Plan:
 
 def prepare() -> None:
     """Load what every mutant's tests need, and have hypothesis look for no smallest example."""
-    for name in _HEAVY:
+    for name in HEAVY:
         importlib.import_module(name)
+    register_profile()
+
+
+def register_profile() -> None:
+    """A profile of hypothesis that looks for no smallest example."""
     phases = (hypothesis.Phase.explicit, hypothesis.Phase.generate)
     hypothesis.settings.register_profile(
-        _PROFILE, deadline=None, phases=phases, database=None, derandomize=True
+        PROFILE, deadline=None, phases=phases, database=None, derandomize=True
     )
 
 
 def survives(built: Built | None, tests: Sequence[str], longest_s: int) -> bool:
-    """Whether all tests pass with the mutant, or with none, in a process of its own."""
+    """Whether all tests pass with the mutant, or with none, in a process of its own.
+
+    RuntimeError when they could not be run: that says nothing of the mutant.
+    """
     sys.stdout.flush()
     child = os.fork()
     if child == 0:
@@ -97,7 +110,7 @@ def survives(built: Built | None, tests: Sequence[str], longest_s: int) -> bool:
         if built is not None:
             os.environ[VARIANT] = str(built.source)
         options = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "-k", LEFT_OUT]
-        options += [f"--hypothesis-profile={_PROFILE}"]
+        options += [f"--hypothesis-profile={PROFILE}"]
         if built is not None and built.extension is not None:
             options += ["--firmware-build", str(built.extension)]
         files = [f"tests/firmware/test_{name}{'' if '::' in name else '.py'}" for name in tests]
@@ -106,7 +119,10 @@ def survives(built: Built | None, tests: Sequence[str], longest_s: int) -> bool:
     while time.monotonic() < until:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
-            return os.waitstatus_to_exitcode(status) == 0
+            code = os.waitstatus_to_exitcode(status)
+            if code in _NOT_RUN:
+                raise RuntimeError(f"{', '.join(tests)}: pytest ended with {code}, no test was run")
+            return code == 0
         time.sleep(0.01)
     os.killpg(child, signal.SIGKILL)
     os.waitpid(child, 0)
