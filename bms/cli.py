@@ -18,6 +18,7 @@ from typer.exceptions import Abort, TyperException
 from typer.main import get_command, get_group
 
 from bms.errors import BmsError
+from bms.imports import left_out
 from bms.interruption import EXIT_INTERRUPTED, INTERRUPTED, prompt_interrupts
 from bms.plain_text import write_plainly
 
@@ -50,7 +51,10 @@ class _LazyCommand(TyperCommand):
 
     def make_context(self, *arguments: Any, **extra: Any) -> Any:
         """Context of the imported command, which then takes the place of this one."""
-        function = self._entry.load()
+        with left_out(
+            "asammdf"
+        ):  # python-can's own writer of MF4 would load it, with all of pandas
+            function = self._entry.load()
         subcommands = getattr(function, _SUBCOMMANDS, ())
         app = _typer(no_args_is_help=True) if subcommands else _typer()
         if not subcommands:

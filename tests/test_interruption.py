@@ -46,6 +46,10 @@ COMMANDS = {
     "replay": ("replay", "--against", "ROOT", "ROOT", "ROOT/tests/hil_sim/golden"),
     "compare-targets": ("compare-targets", "--target", "qemu:mps2-an386", "--build", "IMAGES"),
 }
+WITH_PROCESSES = (
+    *("verify-tables", "campaign", "pack", "reproduce", "fault-matrix", "cell", "cost", "bench"),
+    "compare-targets",
+)
 KEPT = {
     "campaign": {"campaign.json", "chunks"},
     "cell": {"cell.json", "preset.toml", "report.html"},
@@ -73,12 +77,17 @@ def arguments(name, folder):
     return [re.sub("|".join(places), lambda found: str(places[found[0]]), word) for word in words]
 
 
+def tried():
+    """Each command as a terminal interrupts it, and alone too where it has processes of its own."""
+    for name in COMMANDS:
+        marks = needs_emulator if name == "compare-targets" else ()
+        yield pytest.param(name, True, marks=marks, id=f"{name}-process group")
+        if name in WITH_PROCESSES:
+            yield pytest.param(name, False, marks=marks, id=f"{name}-main process")
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("is_for_all", [True, False], ids=["process group", "main process"])
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=needs_emulator) if n == "compare-targets" else n for n in COMMANDS],
-)
+@pytest.mark.parametrize(("name", "is_for_all"), list(tried()))
 def test_ctrl_c_ends_a_command_at_once(name, is_for_all, tmp_path, tmp_path_factory):
     words = arguments(name, tmp_path_factory.mktemp("inputs"))
     with subprocess.Popen(

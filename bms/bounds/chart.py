@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator, ScalarFormatter
 
 from bms.bounds.record import TheoremBound
+from bms.drawing import new_figure
 from bms.files import png, write_bytes
 
 
@@ -17,7 +16,7 @@ def write_chart(theorem: TheoremBound, path: Path) -> None:
 
     InputError when the file cannot be written.
     """
-    figure = Figure(figsize=(7.2, 4.6), layout="constrained")
+    figure = new_figure(7.2, 4.6)
     axes = figure.subplots()
     axes.loglog(theorem.grids, theorem.largest_K, "o-", color="C0", label="largest, data and box")
     axes.loglog(theorem.grids, theorem.rms_K, "s-", color="C2", label="RMS, data")
@@ -52,8 +51,8 @@ def write_chart(theorem: TheoremBound, path: Path) -> None:
         label=f"G = {theorem.model_grid} of the model",
     )
     axes.set_xticks(theorem.grids)
-    axes.xaxis.set_major_formatter(ScalarFormatter())
-    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.set_xticks([], minor=True)
     axes.set_xlabel("grid intervals G")
     axes.set_ylabel("distance to the smooth network (K)")
     axes.grid(True, which="major", alpha=0.3)

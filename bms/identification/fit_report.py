@@ -5,12 +5,13 @@ from __future__ import annotations
 import html
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from bms.arrays import Array
 from bms.data.cycler import CyclerRecording
+from bms.drawing import new_figure
 from bms.files import make_folder, png, write_bytes, write_text
 from bms.identification.cell_identification import (
     IdentifiedCell,
@@ -22,6 +23,9 @@ from bms.identification.electrical import RESISTANCE_SOC, growth, voltage_V
 from bms.identification.preset_check import PresetCheck, predict
 from bms.identification.surface_thermal import ENTROPY_SOC, heat_W, temperatures_K
 from bms.presets import Preset
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PAGE = "identification.html"
 _DPI = 110
@@ -86,7 +90,7 @@ def _plain(preset: Preset, key: str) -> str:
 
 
 def _electrical(cell: IdentifiedCell) -> Figure:
-    figure = Figure(figsize=(9.0, 10.0), layout="constrained")
+    figure = new_figure(9.0, 10.0)
     voltage, error, ocv, ohm = figure.subplots(4, 1)
     records = electrical_records(cell.recordings, cell.alignment, cell.core_K)
     for number, record in enumerate(records):
@@ -117,7 +121,7 @@ def _electrical(cell: IdentifiedCell) -> Figure:
 
 
 def _thermal(cell: IdentifiedCell) -> Figure:
-    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+    figure = new_figure(9.0, 6.0)
     surface, entropy = figure.subplots(2, 1)
     fit = cell.thermal[0]
     for number, (recording, soc) in enumerate(zip(cell.recordings, cell.alignment.soc)):
@@ -145,7 +149,7 @@ def _thermal(cell: IdentifiedCell) -> Figure:
 
 def _check(preset: Preset, unused: CyclerRecording) -> Figure:
     found = predict(preset, unused)
-    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+    figure = new_figure(9.0, 6.0)
     voltage, surface = figure.subplots(2, 1, sharex=True)
     voltage.fill_between(unused.time_s, found.low_V, found.high_V, alpha=0.2, label="family")
     voltage.plot(unused.time_s, found.voltage_V, "--", label="nominal cell")

@@ -28,7 +28,6 @@ from hil_sim.commands import options
 from hil_sim.commands.campaign_output import print_classes, print_family
 from hil_sim.commands.charge_mode import ChargeMode
 from hil_sim.run.workforce import Workforce, dask_workforce, local_workforce
-from hil_sim.studies.campaign.histogram import save_histograms
 from hil_sim.studies.campaign.nominal import NominalPart
 from hil_sim.studies.campaign.real_summary import family_is_safe, summarise_family
 from hil_sim.studies.campaign.run import run_campaign
@@ -124,6 +123,9 @@ def campaign(
         "runs_per_s": round(done / wall_time_s, 3),
     }
     folder.write("summary.json", json.dumps(summary, indent=2) + "\n")
+    # It loads matplotlib, which the processes of a campaign have no use for.
+    from hil_sim.studies.campaign.histogram import save_histograms  # noqa: PLC0415
+
     save_histograms(settings, rows, out / "histograms.png")
     if as_json:
         print(json.dumps(summary, indent=2))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gzip
+import importlib
+import sys
 from collections.abc import Iterable
 from contextlib import ExitStack
 from io import TextIOWrapper
@@ -79,6 +81,9 @@ class LogWriter(Closing):
             if form.is_text:
                 file = stack.enter_context(TextIOWrapper(file, encoding="utf-8"))
             self._lines = _CandumpLines(file) if form.suffix == ".log" else None
+            if form.library and form.library not in sys.modules:
+                # The command line has left it out; what is loaded now serves the same classes.
+                importlib.reload(can.io.mf4)
             self._writer = MESSAGE_WRITERS[form.suffix](file, **options)
             self._files = stack.pop_all()
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import json
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
+from bms.drawing import new_figure
+from bms.files import png
 from hil_sim.pack.charge import PackResult
 from hil_sim.pack.summary import KINDS, has_passed, summary
 from hil_sim.report.folder import OutputFolder
@@ -21,7 +21,7 @@ def heat_map(result: PackResult) -> bytes:
     """PNG: core temperature of every cell over time, the current, and who governs."""
     settings = result.settings
     limits = settings.preset.limits
-    figure = Figure(figsize=(9.0, 7.5), layout="constrained")
+    figure = new_figure(9.0, 7.5)
     current, cores = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.6))
     times = np.array(result.sample_s)
     current.plot(times, result.current_A, color="#0072B2")
@@ -44,9 +44,7 @@ def heat_map(result: PackResult) -> bytes:
         cores.legend(loc="upper left")
     bar = figure.colorbar(picture, ax=cores)
     bar.set_label(f"True core temperature (K), limit {limits.max_core_temperature_K:g} K")
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
-    return buffer.getvalue()
+    return png(figure, _DPI)
 
 
 def write_pack_report(folder: OutputFolder, result: PackResult) -> None:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
+from bms.drawing import new_figure
+from bms.files import png
 from bms.presets.schema import Limits
 from hil_sim.run.result import RunResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers and in grey.
 CONTROLLER_COLOURS = (
@@ -23,7 +26,7 @@ CONTROLLER_COLOURS = (
     "#F0E442",
 )
 ESTIMATE_COLOUR, LIMIT_COLOUR = "#000000", "#7A1F5C"
-_DPI = 130
+CHART_DPI = 130
 _LEGEND_COLUMNS = 4
 
 
@@ -34,7 +37,7 @@ def charge_chart(
 
     `bound_s` marks the time before which no controller can be done.
     """
-    figure = Figure(figsize=(9.0, 11.0), layout="constrained")
+    figure = new_figure(9.0, 11.0)
     panels = figure.subplots(5, 1, sharex=True)
     quantities = (
         ("current_A", "Current\n(A)", limits.reference_current_A, "reference {:g} A"),
@@ -84,12 +87,12 @@ def charge_chart(
         ncols=min(len(entries), _LEGEND_COLUMNS),
         frameon=False,
     )
-    return png(figure)
+    return png(figure, CHART_DPI)
 
 
 def estimate_chart(result: RunResult) -> bytes:
     """PNG with true and estimated core temperature, and the error within its bound, over time."""
-    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
+    figure = new_figure(9.0, 5.0)
     temperatures, errors = figure.subplots(2, 1, sharex=True)
     colour = CONTROLLER_COLOURS[0]
     _line(temperatures, result, "core_temperature_K", colour, "true", width=1.8)
@@ -113,7 +116,7 @@ def estimate_chart(result: RunResult) -> bytes:
         _bound(errors, -bound_K, None)
     errors.set_ylabel("Estimate –\ntruth (K)")
     errors.set_xlabel("Time since the start of the charge (s)")
-    return png(figure)
+    return png(figure, CHART_DPI)
 
 
 def _line(
@@ -159,10 +162,3 @@ def _name_bound(axes: Axes, bound_s: float) -> None:
         color=LIMIT_COLOUR,
         fontsize=8.5,
     )
-
-
-def png(figure: Figure) -> bytes:
-    """The figure as PNG, the same bytes every time."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
-    return buffer.getvalue()

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
 
+from bms.drawing import new_figure
+from bms.files import png
 from hil_sim.nodes.punctuality import PlantWatch, TimeStatistics, Timing
-from hil_sim.report.chart import CONTROLLER_COLOURS, png
+from hil_sim.report.chart import CHART_DPI, CONTROLLER_COLOURS
 from hil_sim.report.figures import Figure
 from hil_sim.run.result import RunResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _BINS = 60
 _MS_PER_S = 1000.0
@@ -63,12 +67,12 @@ def _ms(times: TimeStatistics | None, name: str) -> str:
 
 def timing_chart(watch: PlantWatch) -> bytes:
     """PNG with histograms of lateness and of the time to the command; counts on a log scale."""
-    figure = Canvas(figsize=(9.0, 3.2), layout="constrained")
+    figure = new_figure(9.0, 3.2)
     late, latency = figure.subplots(1, 2)
     _histogram(late, watch.slots.late_s, "Measurements later than due (ms)")
     _histogram(latency, watch.latency_s, "Command after its measurements (ms)")
     late.set_ylabel("Periods")
-    return png(figure)
+    return png(figure, CHART_DPI)
 
 
 def _histogram(axes: Axes, times_s: Sequence[float], label: str) -> None:

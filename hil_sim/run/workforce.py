@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import multiprocessing
 import signal
 from collections.abc import Callable, Iterator
@@ -13,6 +14,7 @@ from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
 from bms.errors import InputError
+from bms.imports import left_out
 
 T = TypeVar("T")
 _CONNECT_TIMEOUT_S = 10.0
@@ -43,7 +45,7 @@ class WorkerPool(ProcessPoolExecutor):
     """
 
     def __init__(self, jobs: int) -> None:
-        super().__init__(jobs, multiprocessing.get_context("spawn"))
+        super().__init__(jobs, multiprocessing.get_context("spawn"), _load_python_can)
         resource_tracker.ensure_running()  # it would unblock the signal when it is started below
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
@@ -53,6 +55,12 @@ class WorkerPool(ProcessPoolExecutor):
             return super().submit(fn, *args, **kwargs)
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _load_python_can() -> None:
+    """As the command line does, which has started the process: without what it loads for MF4."""
+    with left_out("asammdf"):
+        importlib.import_module("can")
 
 
 @contextmanager

@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from bms.arrays import Array
+from bms.drawing import new_figure
 from bms.studies.explanation.explain import EdgeExplanation, Explanation, Sensitivity
 from bms.studies.explanation.symbols import input_symbol, input_unit, node_symbol
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _PANEL_INCHES = (3.4, 3.0)
 _PANELS_A_ROW = 4
@@ -66,8 +66,7 @@ def _panels(count: int) -> tuple[Figure, list[Axes]]:
     columns = min(count, _PANELS_A_ROW)
     rows = -(-count // columns)
     width, height = _PANEL_INCHES
-    figure = Figure(figsize=(max(columns * width, 4.6), rows * height + 0.3), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(max(columns * width, 4.6), rows * height + 0.3)
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes in grid[count:]:
         axes.set_axis_off()

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
-
 import numpy as np
-from matplotlib.figure import Figure
 
+from bms.drawing import new_figure
+from bms.files import png
 from bms.studies.optimum.answer import Case
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers and in grey.
@@ -16,7 +15,7 @@ _DPI = 130
 
 def chart(title: str, cases: list[Case]) -> bytes:
     """PNG with current, temperatures and state of charge over time of each case."""
-    figure = Figure(figsize=(9.0, 7.0), layout="constrained")
+    figure = new_figure(9.0, 7.0)
     currents, temperatures, charges = figure.subplots(3, 1, sharex=True)
     for case, colour in zip(cases, _COLOURS):
         bound = case.bound
@@ -37,6 +36,4 @@ def chart(title: str, cases: list[Case]) -> bytes:
         axes.spines[["top", "right"]].set_visible(False)
     currents.legend(loc="upper center", frameon=False)
     currents.set_title(title, fontsize=10)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
-    return buffer.getvalue()
+    return png(figure, _DPI)

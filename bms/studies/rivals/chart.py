@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from itertools import cycle
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from bms.arrays import Array
+from bms.drawing import new_figure
 from bms.files import png, write_bytes
 from bms.studies.rivals.comparison import Comparison, Row
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
 _MARKERS = "osD^vP*Xh<>"
 _MARKS = 12
@@ -23,9 +25,9 @@ _SMALLEST_SHOWN_K = 1e-4
 
 def save_chart(comparison: Comparison, path: Path) -> None:
     """Write the PNG; InputError when that cannot be done."""
-    figure = Figure(figsize=(13, 6.4), layout="constrained")
+    figure = new_figure(13, 6.4)
     cost, trace = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
-    colours = cycle(colormaps["tab10"].colors)  # type: ignore[attr-defined]
+    colours = cycle(f"C{place}" for place in range(10))
     for row, colour, marker in zip(comparison.rows, colours, cycle(_MARKERS)):
         if row.cost is not None:
             _draw(row, comparison, cost, trace, colour, marker)
@@ -42,7 +44,7 @@ def _draw(
     comparison: Comparison,
     cost: Axes,
     trace: Axes,
-    colour: tuple[float, float, float],
+    colour: str,
     marker: str,
 ) -> None:
     assert row.cost is not None
@@ -81,9 +83,7 @@ def _running_rms_K(error_K: Array, time_s: Array) -> Array:
 def _label(cost: Axes, trace: Axes, comparison: Comparison) -> None:
     cost.set_xscale("log")
     cost.margins(x=0.1, y=0.1)
-    cost.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    cost.xaxis.set_major_formatter(FormatStrFormatter("%g"))
-    cost.xaxis.set_minor_formatter(NullFormatter())
+    _label_decades(cost.xaxis)
     cost.set_xlabel("multiply-adds per estimate")
     cost.set_ylabel("RMSE in K")
     cost.set_title("error and cost, both better to the lower left", fontsize=10)
@@ -92,7 +92,13 @@ def _label(cost: Axes, trace: Axes, comparison: Comparison) -> None:
     trace.set_title(comparison.trace.title, fontsize=10)
     for axis in (cost, trace):
         axis.set_yscale("log")
-        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.yaxis.set_major_formatter(FormatStrFormatter("%g"))
-        axis.yaxis.set_minor_formatter(NullFormatter())
+        _label_decades(axis.yaxis)
         axis.grid(alpha=0.3)
+
+
+def _label_decades(axis: Axis) -> None:
+    from matplotlib.ticker import LogLocator  # noqa: PLC0415 -- as in bms.drawing
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter("")

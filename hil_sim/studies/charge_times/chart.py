@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 from typing import Any
 
-from matplotlib.figure import Figure
-
+from bms.drawing import new_figure
+from bms.files import png
 from hil_sim.report.chart import CONTROLLER_COLOURS, LIMIT_COLOUR
 from hil_sim.studies.charge_times.tables import crossed_limits, start_text
 
@@ -21,7 +20,7 @@ _WIDEST = 2.5
 def comparison_chart(content: Mapping[str, Any]) -> bytes:
     """PNG with a row a start; an open mark stands for a charge that crossed a limit."""
     rows = content["starts"]
-    figure = Figure(figsize=(9.0, 2.0 + 0.28 * len(rows)), layout="constrained")
+    figure = new_figure(9.0, 2.0 + 0.28 * len(rows))
     axes = figure.subplots()
     for number, (name, figures) in enumerate(content["controllers"].items()):
         colour, marker = _COLOURS[number % len(_COLOURS)], _MARKERS[number % len(_MARKERS)]
@@ -46,6 +45,4 @@ def comparison_chart(content: Mapping[str, Any]) -> bytes:
     axes.set_xlabel("time to full over physics' bound (–); open: a limit was crossed")
     axes.grid(axis="x", alpha=0.3)
     figure.legend(loc="outside lower center", ncols=3, fontsize=8)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
-    return buffer.getvalue()
+    return png(figure, _DPI)

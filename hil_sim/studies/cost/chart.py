@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from hil_sim.report.chart import png
+from bms.drawing import new_figure
+from bms.files import png
+from hil_sim.report.chart import CHART_DPI
 from hil_sim.studies.cost.measure import CostReport
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _PANELS = (
     {"control_period": ("whole control period", "C0")},
@@ -25,7 +29,7 @@ _HEADROOM = 1.35
 
 def cost_chart(reports: Sequence[CostReport], period_s: float) -> bytes:
     """PNG with a row of panels for each board, instructions over time."""
-    figure = Figure(figsize=(10.0, 3.4 * len(reports)), layout="constrained")
+    figure = new_figure(10.0, 3.4 * len(reports))
     panels = figure.subplots(len(reports), len(_PANELS), squeeze=False, sharex=True)
     for report, row in zip(reports, panels):
         for axes, lines in zip(row, _PANELS):
@@ -33,7 +37,7 @@ def cost_chart(reports: Sequence[CostReport], period_s: float) -> bytes:
         row[0].set_ylabel("instructions")
     for axes in panels[-1]:
         axes.set_xlabel("time since the ECU's first decision (s)")
-    return png(figure)
+    return png(figure, CHART_DPI)
 
 
 def _draw(
