@@ -7,6 +7,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -218,6 +219,34 @@ def test_a_charge_that_crosses_a_limit_stops_the_chain(bms, quick, tmp_path, mon
     assert code == 1
     assert list(taken) == STEPS[:4]
     assert "324 K over 323 K" in taken["charge"]["said"]
+
+
+@pytest.mark.parametrize(("reds", "passed"), [(1, True), (2, True), (3, False)])
+def test_a_row_on_clocks_is_played_again_alone_where_the_machine_was_late(
+    monkeypatch, reds, passed
+):
+    """Twice at most; any other red row stands at once."""
+    clocks = next(row for row in load_matrix(None) if row.realtime)
+    other = load_matrix(None)[0]
+    played = []
+
+    def verdict(row, failures):
+        return SimpleNamespace(row=row, passed=not failures, failures=failures)
+
+    def play(settings, row):
+        played.append(row.name)
+        return verdict(row, ("no current again in period 12",) if len(played) < reds else ())
+
+    first = [verdict(clocks, ("no current",)), verdict(other, ())]
+    monkeypatch.setattr(steps, "play", play)
+    found, again = steps._in_time(None, first)
+    assert [one.passed for one in found] == [passed, True]
+    assert again == ((clocks.name,) if passed else ())
+    assert played == [clocks.name] * min(reds, 2)
+
+    played.clear()
+    found, again = steps._in_time(None, [verdict(other, ("red",))])
+    assert (found[0].failures, again, played) == (("red",), (), [])
 
 
 def test_without_anything_to_start_from_it_is_told_what_to_give(bms, tmp_path):
