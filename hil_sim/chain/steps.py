@@ -133,7 +133,7 @@ def preset_from_recordings(files: Sequence[Path], chosen: SurfaceOptions) -> Ste
                 identify_surface(files, own, place.path(f"{name}.toml"), as_json=False)
             place.path(IDENTIFICATION).write_text(said.getvalue(), encoding="utf-8")
             place.path(f"{name}.toml").rename(place.path(PRESET))
-            require_no_complaints(place.path(PRESET))
+            require_identified(files[0], place.path(PRESET))
             fits = sorted(path.name for path in page.path("page").parent.iterdir())
             page.commit()
             place.commit()
@@ -154,6 +154,16 @@ def require_no_complaints(path: Path) -> None:
         raise InputError(
             f"{path}: {first.key}: {first.what}{more}; 'bms preset check FILE' tells all with "
             "remedies"
+        )
+
+
+def require_identified(recording: Path, path: Path) -> None:
+    """Raise InputError when the preset that recordings gave would be complained about."""
+    if found := complaints(path):
+        told = "; ".join(f"{one.key}: {one.what}" for one in found)
+        raise InputError(
+            f"{recording}: the recordings give a cell that is none: {told}; check their units and "
+            "that the slowest of them goes from full to empty"
         )
 
 

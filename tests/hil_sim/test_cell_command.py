@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from bms.image import calibration_part
@@ -392,5 +393,31 @@ def test_wrong_inputs_are_refused_at_once_with_their_cause(
     told = [line for line in err.splitlines() if not PROGRESS.fullmatch(line)]
     assert (code, taken, len(told)) == (2, {}, 1), err
     assert said in told[0]
+    assert quick == []
+    assert not (tmp_path / "out" / "preset.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (lambda table: table[:350], "the recordings give a cell that is none"),
+        (lambda table: table * [1, 1, 0, 1, 1] + [0, 0, 3.3, 0, 0], "voltage moves by 0 V"),
+        (lambda table: table * [1 / 60, 1, 1, 1, 1], "slowest of them goes from full to empty"),
+        (lambda table: table * [1, 0, 1, 1, 1], "give a charge or discharge of the whole cell"),
+        (lambda table: table[:9], "give a charge or discharge of the whole cell"),
+    ],
+    ids=["a fraction of a cell", "flat voltage", "time in minutes", "no current", "nine rows"],
+)
+def test_thin_or_wrong_recordings_are_refused_with_cause_and_remedy(
+    bms, quick, tmp_path, edit, said
+):
+    folder = tmp_path / "cycler"
+    folder.mkdir()
+    slow = write_cycler(folder / "slow.csv", CELL, lambda time_s: CELL.capacity_Ah / 10, 10.0, 1)
+    np.savetxt(slow, edit(np.loadtxt(slow, delimiter=",")), delimiter=",", fmt="%.5f")
+    code, taken, err = call(bms, slow, *COLUMNS, *SIGNS, *RATED, "--out", tmp_path / "out")
+    told = [line for line in err.splitlines() if not PROGRESS.fullmatch(line)]
+    assert (code, taken, len(told)) == (2, {}, 1), err
+    assert f"{slow}: " in told[0] and said in told[0]
     assert quick == []
     assert not (tmp_path / "out" / "preset.toml").exists()
