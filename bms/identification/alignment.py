@@ -18,6 +18,8 @@ _FULL_SHARE = 0.8
 """Of the widest recording's charge, above which a recording spans the cell."""
 _SPECIMEN_SHARE = 0.012
 """By which capacities of one specimen differ at most."""
+_LEAST_SWING_V = 0.1
+"""From empty to full; the flattest cells, of iron phosphate or titanate, have 0.5 V and more."""
 _LEAST_CHARGE_AH = 0.01
 
 
@@ -63,6 +65,14 @@ def align(recordings: Sequence[CyclerRecording], curve: Curve | None = None) -> 
             f"{recordings[0].path}: no recording moves more than {widest_Ah:.3g} Ah; "
             "give a charge or discharge of the whole cell, the slower the better"
         )
+    for recording, span_Ah in zip(recordings, spans_Ah):
+        moved_V = float(np.ptp(recording.voltage_V))
+        if span_Ah > _FULL_SHARE * widest_Ah and moved_V < _LEAST_SWING_V:
+            raise InputError(
+                f"{recording.path}: voltage moves by {moved_V:.3g} V while {span_Ah:.3g} Ah flow, "
+                f"which no whole cell's does by less than {_LEAST_SWING_V:g} V; another column is "
+                "the voltage (--columns), or the recording is only a part of a cell's charge"
+            )
     wide = [
         number
         for number, span_Ah in enumerate(spans_Ah)

@@ -13,14 +13,11 @@ from bms.identification.cell_identification import (
     IdentifiedCell,
     electrical_records,
     model_voltage_V,
-    thermal_record,
 )
-from bms.identification.disturbance_bound import disturbance_bound
+from bms.identification.core_disturbance import CoreDisturbance, core_disturbance
 from bms.identification.electrical import rest_offset_V, step_ohm, step_rows
 from bms.identification.geometry import SURFACE_SHARE
-from bms.identification.lumped_disturbance import lumped_missing_K_per_s
 from bms.identification.rated import RatedLimits
-from bms.identification.surface_thermal import heat_W
 
 _ONE_WAY_OCV_V = 0.01
 _LEAST_OCV_V = 0.003
@@ -65,7 +62,10 @@ def cell_intervals(cell: IdentifiedCell, rated: RatedLimits) -> CellIntervals:
     least_ohm = _resistance(cell, rated, factors, notes)
     _capacity(cell, rated, factors, notes)
     _open_circuit(cell, factors, notes)
-    uncertainty, uncertainty_notes = _uncertainty(cell)
+    core = core_disturbance(cell)
+    uncertainty, uncertainty_notes = _uncertainty(cell, core)
+    if core.remark is not None:
+        remarks.append(core.remark)
     if all(np.all(r.current_A > -0.2 * cell.alignment.capacity_Ah) for r in cell.recordings):
         remarks.append(
             "no recording charges with more than C/5: resistances are those of discharge, "
@@ -219,36 +219,22 @@ def _open_circuit(cell: IdentifiedCell, factors: dict[str, Any], notes: dict[str
     notes["ocv_error_V"] = note
 
 
-def _uncertainty(cell: IdentifiedCell) -> tuple[dict[str, float], dict[str, str]]:
-    """Disturbance of the core that grows with the current, of residuals of the surface."""
-    rates, currents_A = [], []
-    for recording, soc in zip(cell.recordings, cell.alignment.soc):
-        if recording.name not in cell.thermal_names:
-            continue
-        irreversible_W = recording.current_A * (cell.electrical.ocv(soc) - recording.voltage_V)
-        record = thermal_record(recording, soc, irreversible_W)
-        fit = cell.thermal[0]
-        rates.append(lumped_missing_K_per_s(fit, record, heat_W(record, fit.entropic_V_per_K)))
-        currents_A.append(recording.current_A)
-    assumed = "assumed"
+def _uncertainty(
+    cell: IdentifiedCell, core: CoreDisturbance
+) -> tuple[dict[str, float], dict[str, str]]:
+    """Bounds on the disturbances, with where each comes from."""
     found = {
         "soc_per_s": 0.0,
-        "core_K_per_s": _UNCERTAINTY_K_PER_S,
+        "core_K_per_s": _up(core.bound.constant_K_per_s),
         "surface_K_per_s": _UNCERTAINTY_K_PER_S,
         "coolant_K_per_s": _UNCERTAINTY_K_PER_S,
         "surface_rate_K_per_s2": 0.1,
     }
-    notes = dict.fromkeys(found, assumed)
-    if not rates:
-        found["core_K_per_s"] = 4.0 * _UNCERTAINTY_K_PER_S
-        return found, notes
-    bound = disturbance_bound(np.concatenate(rates), np.concatenate(currents_A), grows=True)
-    growth = bound.conformal
-    found["core_K_per_s"] = _up(max(growth.constant_K_per_s, _UNCERTAINTY_K_PER_S))
-    found["core_K_per_As"] = _up(growth.per_A_K_per_As)
-    found["core_K_per_A2s"] = _up(growth.per_A2_K_per_A2s)
-    fitted = "fitted: what the surface's residuals need in 99.9 % of the rows, conformal"
-    notes |= {key: fitted for key in ("core_K_per_s", "core_K_per_As", "core_K_per_A2s")}
+    notes = dict.fromkeys(found, "assumed") | {"core_K_per_s": core.at_rest}
+    if cell.is_thermal_fitted:
+        found["core_K_per_As"] = _up(core.bound.per_A_K_per_As)
+        found["core_K_per_A2s"] = _up(core.bound.per_A2_K_per_A2s)
+        notes |= dict.fromkeys(("core_K_per_As", "core_K_per_A2s"), core.growing)
     return found, notes
 
 

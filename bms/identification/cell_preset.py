@@ -13,6 +13,7 @@ from bms.cell import CellInterval, CellParameters, OpenCircuitVoltage
 from bms.cell.tables import EntropyTable, ResistanceTable
 from bms.identification.cell_identification import IdentifiedCell
 from bms.identification.cell_intervals import CellIntervals, cell_intervals
+from bms.identification.core_disturbance import warmest_coolant_K
 from bms.identification.electrical import RESISTANCE_SOC, growth
 from bms.identification.rated import RatedLimits
 from bms.identification.surface_thermal import ENTROPY_SOC
@@ -64,6 +65,7 @@ def cell_preset(
     notes: dict[str, str] = {}
     parameters = _parameters(cell, rated, interval, full, given, notes)
     limits = _limits(rated, parameters, full, _voltage_sensor(interval), notes)
+    uncertainty = _uncertainty(interval, notes)
     preset = Preset(
         name=name,
         description=f"Identified from {len(cell.recordings)} recordings without a measured core",
@@ -71,11 +73,11 @@ def cell_preset(
         cell=parameters,
         limits=limits,
         gains=_gains(parameters, notes),
-        uncertainty=_uncertainty(interval, notes),
+        uncertainty=uncertainty,
         timing=Timing(0.1, 0.1),
         sensors=_sensors(limits, interval),
         initial=_initial(rated, limits, parameters, notes),
-        operating_box=_box(rated, parameters, limits, notes),
+        operating_box=_box(rated, parameters, limits, uncertainty, notes),
         plug_in=_plug_in(cell, parameters, notes),
         supply=Supply(_TOLERANCE, _LAG_S),
         current_map=_map(rated, notes),
@@ -317,14 +319,19 @@ def _initial(
 
 
 def _box(
-    rated: RatedLimits, cell: CellParameters, limits: Limits, notes: dict[str, str]
+    rated: RatedLimits,
+    cell: CellParameters,
+    limits: Limits,
+    noise: Uncertainty,
+    notes: dict[str, str],
 ) -> OperatingBox:
     notes |= {
         "operating_box.current_A": "the strongest current with the charger's tolerance",
         "operating_box.cooling_power_W": "up to twice the heat at the strongest current, at "
         "most what the CAN bus carries",
         "operating_box.surface_temperature_K": "range of charging, and 3 K beyond",
-        "operating_box.coolant_temperature_K": "the surface's, and 10 K colder",
+        "operating_box.coolant_temperature_K": "10 K colder than the surface; up to where no "
+        "disturbance takes a cell of the family over its limits without a current",
     }
     strongest_A = rated.max_charge_A
     power_W = _heat_W(cell, limits)
@@ -333,7 +340,10 @@ def _box(
         (-_figures(1.09 * strongest_A), _figures(0.02 * strongest_A, 2)),
         (-_figures(0.05 * power_W, 2), min(_figures(2.0 * power_W, 2), _MOST_COOLING_W)),
         (round(rated.coldest_K - _BOX_BELOW_K, 2), round(top_K, 2)),
-        (round(rated.coldest_K - _COOLANT_BELOW_K, 2), round(top_K, 2)),
+        (
+            round(rated.coldest_K - _COOLANT_BELOW_K, 2),
+            min(round(top_K, 2), warmest_coolant_K(cell, limits, noise)),
+        ),
     )
 
 

@@ -32,7 +32,8 @@ from codegen.can_sources import can_sources
 from hil_sim.chain.state import file_hash
 from hil_sim.fault_matrix.matrix import load_matrix
 from hil_sim.fault_matrix.report import MatrixResult, matrix_json, matrix_page
-from hil_sim.fault_matrix.runner import MatrixSettings, play_all
+from hil_sim.fault_matrix.runner import MatrixSettings, play, play_all
+from hil_sim.fault_matrix.verdict import Verdict
 from hil_sim.logs.recorder import Recorder
 from hil_sim.report.files import write_report
 from hil_sim.report.folder import OutputFolder
@@ -44,6 +45,8 @@ from hil_sim.targets.catalog import DEFAULT_BOARD, find_board
 PRESET, MODEL, CERTIFICATE = "preset.toml", "model.json", "verify.json"
 IDENTIFICATION, FITS = "identify.txt", "identify"
 """What was fitted how well; the folder has a page with the fits."""
+_MORE_TRIES = 2
+"""Of a red row on clocks of its own."""
 _LONGEST_CHARGE = 3.0
 """Of the time that the strongest current would take; the rest of it is an hour."""
 
@@ -130,7 +133,7 @@ def preset_from_recordings(files: Sequence[Path], chosen: SurfaceOptions) -> Ste
                 identify_surface(files, own, place.path(f"{name}.toml"), as_json=False)
             place.path(IDENTIFICATION).write_text(said.getvalue(), encoding="utf-8")
             place.path(f"{name}.toml").rename(place.path(PRESET))
-            require_no_complaints(place.path(PRESET))
+            require_identified(files[0], place.path(PRESET))
             fits = sorted(path.name for path in page.path("page").parent.iterdir())
             page.commit()
             place.commit()
@@ -151,6 +154,16 @@ def require_no_complaints(path: Path) -> None:
         raise InputError(
             f"{path}: {first.key}: {first.what}{more}; 'bms preset check FILE' tells all with "
             "remedies"
+        )
+
+
+def require_identified(recording: Path, path: Path) -> None:
+    """Raise InputError when the preset that recordings gave would be complained about."""
+    if found := complaints(path):
+        told = "; ".join(f"{one.key}: {one.what}" for one in found)
+        raise InputError(
+            f"{recording}: the recordings give a cell that is none: {told}; check their units and "
+            "that the slowest of them goes from full to empty"
         )
 
 
@@ -241,15 +254,35 @@ def _faults(folder: Path, choices: Choices) -> Outcome:
     start_s = time.perf_counter()
     with waiting("playing faults", len(rows), "rows") as wait:
         verdicts = play_all(settings, rows, choices.jobs, wait.advance)
+    verdicts, again = _in_time(settings, verdicts)
     result = MatrixResult(settings, verdicts, time.perf_counter() - start_s)
     with OutputFolder(folder / "faults") as place:
         text = json.dumps(matrix_json(result), indent=2) + "\n"
         place.path("fault-matrix.json").write_text(text, encoding="utf-8")
         place.path("fault-matrix.html").write_text(matrix_page(result), encoding="utf-8")
         place.commit()
+    late = f"; played again alone, for want of time: {', '.join(again)}" if again else ""
     red = "".join(f"; {verdict.row.name}: {', '.join(verdict.failures)}" for verdict in result.red)
     files = ("faults/fault-matrix.html", "faults/fault-matrix.json")
-    return Outcome(result.sentence + red, files, passed=not result.red)
+    return Outcome(result.sentence + late + red, files, passed=not result.red)
+
+
+def _in_time(
+    settings: MatrixSettings, verdicts: Sequence[Verdict]
+) -> tuple[list[Verdict], tuple[str, ...]]:
+    """The verdicts, and rows on clocks of their own that were red and went as expected alone.
+
+    A busy machine misses periods of such a row, which then says nothing of the firmware. One that
+    is red alone too, twice, stays so.
+    """
+    found, again = list(verdicts), []
+    for place, verdict in enumerate(verdicts):
+        for _ in range(_MORE_TRIES if verdict.row.realtime and not verdict.passed else 0):
+            found[place] = play(settings, verdict.row)
+            if found[place].passed:
+                again.append(verdict.row.name)
+                break
+    return found, tuple(again)
 
 
 def _export(folder: Path) -> Outcome:

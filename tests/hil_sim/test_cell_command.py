@@ -7,7 +7,9 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from bms.image import calibration_part
@@ -220,6 +222,34 @@ def test_a_charge_that_crosses_a_limit_stops_the_chain(bms, quick, tmp_path, mon
     assert "324 K over 323 K" in taken["charge"]["said"]
 
 
+@pytest.mark.parametrize(("reds", "passed"), [(1, True), (2, True), (3, False)])
+def test_a_row_on_clocks_is_played_again_alone_where_the_machine_was_late(
+    monkeypatch, reds, passed
+):
+    """Twice at most; any other red row stands at once."""
+    clocks = next(row for row in load_matrix(None) if row.realtime)
+    other = load_matrix(None)[0]
+    played = []
+
+    def verdict(row, failures):
+        return SimpleNamespace(row=row, passed=not failures, failures=failures)
+
+    def play(settings, row):
+        played.append(row.name)
+        return verdict(row, ("no current again in period 12",) if len(played) < reds else ())
+
+    first = [verdict(clocks, ("no current",)), verdict(other, ())]
+    monkeypatch.setattr(steps, "play", play)
+    found, again = steps._in_time(None, first)
+    assert [one.passed for one in found] == [passed, True]
+    assert again == ((clocks.name,) if passed else ())
+    assert played == [clocks.name] * min(reds, 2)
+
+    played.clear()
+    found, again = steps._in_time(None, [verdict(other, ("red",))])
+    assert (found[0].failures, again, played) == (("red",), (), [])
+
+
 def test_without_anything_to_start_from_it_is_told_what_to_give(bms, tmp_path):
     code, _, err = bms("cell", "--out", tmp_path / "out")
     assert (code, err.count("\n")) == (2, 1)
@@ -363,5 +393,31 @@ def test_wrong_inputs_are_refused_at_once_with_their_cause(
     told = [line for line in err.splitlines() if not PROGRESS.fullmatch(line)]
     assert (code, taken, len(told)) == (2, {}, 1), err
     assert said in told[0]
+    assert quick == []
+    assert not (tmp_path / "out" / "preset.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (lambda table: table[:350], "the recordings give a cell that is none"),
+        (lambda table: table * [1, 1, 0, 1, 1] + [0, 0, 3.3, 0, 0], "voltage moves by 0 V"),
+        (lambda table: table * [1 / 60, 1, 1, 1, 1], "slowest of them goes from full to empty"),
+        (lambda table: table * [1, 0, 1, 1, 1], "give a charge or discharge of the whole cell"),
+        (lambda table: table[:9], "give a charge or discharge of the whole cell"),
+    ],
+    ids=["a fraction of a cell", "flat voltage", "time in minutes", "no current", "nine rows"],
+)
+def test_thin_or_wrong_recordings_are_refused_with_cause_and_remedy(
+    bms, quick, tmp_path, edit, said
+):
+    folder = tmp_path / "cycler"
+    folder.mkdir()
+    slow = write_cycler(folder / "slow.csv", CELL, lambda time_s: CELL.capacity_Ah / 10, 10.0, 1)
+    np.savetxt(slow, edit(np.loadtxt(slow, delimiter=",")), delimiter=",", fmt="%.5f")
+    code, taken, err = call(bms, slow, *COLUMNS, *SIGNS, *RATED, "--out", tmp_path / "out")
+    told = [line for line in err.splitlines() if not PROGRESS.fullmatch(line)]
+    assert (code, taken, len(told)) == (2, {}, 1), err
+    assert f"{slow}: " in told[0] and said in told[0]
     assert quick == []
     assert not (tmp_path / "out" / "preset.toml").exists()

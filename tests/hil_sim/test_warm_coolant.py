@@ -58,9 +58,8 @@ def highest_at_rest_K(preset: Preset, cell: TrueCell, state: CellState) -> np.nd
 def excess_K(preset: Preset, run: int, warmest_K: float = np.inf) -> float:
     """By how much a charge takes the core over its limit, from such a start up to a coolant."""
     limits = preset.limits
-    settings = CampaignSettings(
-        preset, load_shipped_model(preset.name), 1, 0, LONGEST_S, family=CellFamily.REAL
-    )
+    model = replace(load_shipped_model(preset.name), training_hash=preset.training_hash)
+    settings = CampaignSettings(preset, model, 1, 0, LONGEST_S, family=CellFamily.REAL)
     numbers, random = streams(SEED, run), np.random.default_rng(run)
     drawn = draw_real(preset, LONGEST_S, numbers.draw)
     limit_K = limits.max_core_temperature_K
@@ -91,18 +90,39 @@ def excess_K(preset: Preset, run: int, warmest_K: float = np.inf) -> float:
     return float(peaks.core_temperature_K) - limit_K
 
 
+def restless() -> Preset:
+    """samsung_30q, if its recordings left 0.0042 K/s of the core unexplained at rest."""
+    preset = load_preset("samsung_30q")
+    uncertainty = replace(preset.uncertainty, core_K_per_s=0.00419, core_K_per_As=7.53e-5)
+    coldest_K, _ = preset.operating_box.coolant_temperature_K
+    box = replace(preset.operating_box, coolant_temperature_K=(coldest_K, 326.15))
+    return replace(preset, uncertainty=uncertainty, operating_box=box)
+
+
 @pytest.mark.slow
 def test_beside_a_coolant_within_the_stated_one_no_core_crosses_its_limit() -> None:
-    preset = load_preset("samsung_30q")
+    preset = restless()
     for run in (100, 101, 145, 146):
         assert excess_K(preset, run, warmest_coolant_K(preset)) <= 0.0, run
 
 
 @pytest.mark.slow
 def test_beside_a_warmer_one_some_do() -> None:
-    preset = load_preset("samsung_30q")
+    preset = restless()
     assert excess_K(preset, 101) > 0.3
     assert excess_K(preset, 146) > 0.3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("run", [100, 101, 145, 146])
+def test_the_shipped_30q_keeps_its_limits_beside_every_coolant_of_its_box(run: int) -> None:
+    assert excess_K(load_preset("samsung_30q"), run) <= 0.0
+
+
+def test_the_box_of_the_shipped_30q_ends_where_its_limits_are_not_kept_any_more() -> None:
+    preset = load_preset("samsung_30q")
+    _, warmest_K = preset.operating_box.coolant_temperature_K
+    assert warmest_coolant_K(preset) - 0.01 < warmest_K <= warmest_coolant_K(preset)
 
 
 @pytest.mark.slow
