@@ -29,8 +29,10 @@ from typing import Any
 import hypothesis
 import pytest
 
-from bms.native_build import ROOT
-from tests.firmware.mutants.build import Built, Factory, compiled_firmware, sources_hash
+from bms.native_build import FIRMWARE, ROOT
+from hil_sim.studies.pack.native_build import PACK
+from tests.firmware.mutants.build import Built, Factory, extension_of, sources_hash
+from tests.firmware.mutation import CompiledFirmware
 from tests.firmware.native_library import VARIANT
 
 if sys.version_info >= (3, 11):
@@ -93,6 +95,12 @@ def register_profile() -> None:
     )
 
 
+def _file(name: str) -> str:
+    """Test file of a name in the plan: one of the firmware, where no folder stands before."""
+    folder, _, stem = name.rpartition("/")
+    return f"tests/{folder or 'firmware'}/test_{stem}{'' if '::' in name else '.py'}"
+
+
 def survives(built: Built | None, tests: Sequence[str], longest_s: int) -> bool:
     """Whether all tests pass with the mutant, or with none, in a process of its own.
 
@@ -112,8 +120,11 @@ def survives(built: Built | None, tests: Sequence[str], longest_s: int) -> bool:
         options = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "-k", LEFT_OUT]
         options += [f"--hypothesis-profile={PROFILE}"]
         if built is not None and built.extension is not None:
-            options += ["--firmware-build", str(built.extension)]
-        files = [f"tests/firmware/test_{name}{'' if '::' in name else '.py'}" for name in tests]
+            if built.native is FIRMWARE:
+                options += ["--firmware-build", str(built.extension)]
+            else:
+                built.native.load_build(built.extension)
+        files = [_file(name) for name in tests]
         os._exit(int(pytest.main([*options, *files])))
     until = time.monotonic() + 20 * longest_s  # of one that waits for what does not come
     while time.monotonic() < until:
@@ -193,10 +204,11 @@ def main() -> int:
     parser.add_argument("sources", nargs="*", help="try these, changed or not")
     parser.add_argument("--all", action="store_true", help="every source, every mutant: hours")
     parser.add_argument("--survivors", action="store_true", help="try those again, no others")
+    parser.add_argument("--seed", default="", help="another sample, of more kinds; it is not kept")
     parser.add_argument("--jobs", type=int, default=2, help="sources at a time")
     arguments = parser.parse_args()
     os.chdir(ROOT)
-    plan, found = Plan.load(), kept()
+    plan, found = Plan.load(), {} if arguments.seed else kept()
     wanted = arguments.sources or [
         source
         for source in plan.tests
@@ -214,16 +226,25 @@ def main() -> int:
     wanted.sort(key=plan.number, reverse=True)
     prepare()
     with tempfile.TemporaryDirectory() as folder, get_context("fork").Pool(arguments.jobs) as pool:
-        firmware = compiled_firmware(Path(folder) / "firmware")
+        compiled = {
+            native.module: CompiledFirmware.build(Path(folder) / native.module, native)
+            for native in (FIRMWARE, PACK)
+        }
         if wanted and not survives(None, plan.all_tests(), 10 * plan.longest_s):
             print("mutants: the tests fail without any", file=sys.stderr)
             return 1
-        factories = [Factory(firmware, Path(folder) / str(i)) for i in range(len(wanted))]
+        natives = [extension_of(source) for source in wanted]
+        factories = [
+            Factory(compiled[native.module], Path(folder) / str(i), native, arguments.seed)
+            for i, native in enumerate(natives)
+        ]
         numbers = [None if arguments.all else plan.number(source) for source in wanted]
         keys = [again[source] for source in wanted]
         tasks = zip(wanted, factories, [plan] * len(wanted), numbers, keys)
         for source, entry in pool.imap_unordered(_try, tasks):
             found[source] = entry
+            if arguments.seed:
+                continue
             KEPT.parent.mkdir(exist_ok=True)
             KEPT.write_text(json.dumps(found), encoding="utf-8")
     found = {source: found[source] for source in plan.tests if source in found}
