@@ -69,6 +69,7 @@ class Factory:
         self.out.mkdir(parents=True, exist_ok=True)
         (self.out / name).write_text(text, encoding="utf-8")
         command = [os.environ.get("CC", "gcc"), *FLAGS, "-w", "-fPIC", "-D_DEFAULT_SOURCE"]
+        command += ["-Werror=implicit-function-declaration"]
         command += [*_INCLUDES, "-c", name, "-o", f"{Path(name).stem}.o"]
         done = subprocess.run(command, cwd=self.out, capture_output=True, check=False)
         if done.returncode != 0:
