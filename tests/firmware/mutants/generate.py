@@ -34,13 +34,14 @@ class Mutant:
 
     def text(self, root: Path) -> str:
         """The whole source with the change."""
-        lines = _without_comments((root / self.source).read_text(encoding="utf-8"))
+        lines = code_lines(root / self.source)
         lines[self.line - 1] = self.after
         return "\n".join(lines) + "\n"
 
 
-def _without_comments(text: str) -> list[str]:
-    """Lines as numerous as before, since the rules leave out each line that has a comment."""
+def code_lines(path: Path) -> list[str]:
+    """Lines of a source, all of them, without comments: the rules leave out a line that has one."""
+    text = path.read_text(encoding="utf-8")
     return _COMMENT.sub(lambda match: "\n" * match[0].count("\n"), text).splitlines()
 
 
@@ -50,7 +51,7 @@ def mutants_of(source: str, root: Path, seed: str = "") -> Iterator[Mutant]:
     A seed draws others, and of more kinds.
     """
     mutants_regexp = import_module("universalmutator.mutator").mutants_regexp
-    lines = _without_comments((root / source).read_text(encoding="utf-8"))
+    lines = code_lines(root / source)
     with contextlib.redirect_stdout(io.StringIO()):
         rules = [*RULES, MORE_RULES] if seed else RULES
         made = mutants_regexp([f"{line}\n" for line in lines], rules, ignorePatterns=_NOT_CODE)

@@ -1,11 +1,12 @@
 """Tries mutants of the C core on the tests of each source, and holds the survivors to the reviewed.
 
-    python -m tests.firmware.mutants.run [SOURCE...] [--all] [--survivors]
+    python -m tests.firmware.mutants.run [SOURCE...] [--all] [--survivors] [--seed WORD]
 
 A process that has loaded what the tests need beside the firmware forks for each mutant. A mutant is
 killed by the first test that fails, by a crash, or by time. build/mutants.json keeps what was
 found for each source; a source that has not changed since is not tried again. A survivor has to
-stand in survivors.toml, with what makes it equivalent or harmless; else the run fails.
+stand in survivors.toml, with what makes it equivalent or harmless; else the run fails. With a seed
+the sample is another one, of more kinds of changes, and nothing of it is kept.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import get_context
@@ -32,6 +33,7 @@ import pytest
 from bms.native_build import FIRMWARE, ROOT
 from hil_sim.studies.pack.native_build import PACK
 from tests.firmware.mutants.build import Built, Factory, extension_of, sources_hash
+from tests.firmware.mutants.generate import code_lines
 from tests.firmware.mutation import CompiledFirmware
 from tests.firmware.native_library import VARIANT
 
@@ -147,7 +149,8 @@ def try_source(
 
     With `only`, all but those count as killed without being tried.
     """
-    killed, survivors, start_s = 0, [], time.monotonic()
+    killed, survivors, refuted, start_s = 0, [], [], time.monotonic()
+    argued = reviewed_survivors()
     longest_s = plan.longest_s * len(plan.tests[source])
     for built in islice(factory.built(source), number):
         is_tried = not only or built.mutant.key in only
@@ -156,6 +159,8 @@ def try_source(
             print(f"survives: {source}:{built.mutant.line}: {built.mutant.key}", file=sys.stderr)
         else:
             killed += 1
+            if is_tried and built.mutant.key in argued:
+                refuted.append(built.mutant.key)
     took = f"{killed} killed, {len(survivors)} survive, {time.monotonic() - start_s:.0f} s"
     print(f"{source}: {took}", file=sys.stderr, flush=True)
     return source, {
@@ -163,6 +168,7 @@ def try_source(
         "tried": killed + len(survivors),
         "killed": killed,
         "survivors": sorted(survivors),
+        "refuted": sorted(refuted),
     }
 
 
@@ -171,16 +177,30 @@ def _try(task: tuple[str, Factory, Plan, int | None, frozenset[str]]) -> tuple[s
 
 
 def unreviewed(found: dict[str, Any], reviewed: dict[str, str]) -> list[str]:
-    """Survivors that nobody has argued about, and arguments about mutants that are killed."""
+    """Survivors that nobody has argued about, and arguments about mutants that are killed.
+
+    An argument about a mutant that was not drawn stays, for as long as its line is in its source.
+    """
     survivors = {key for entry in found.values() for key in entry["survivors"]}
     complaints = [
         f"no argument for the survivor {key}" for key in sorted(survivors - set(reviewed))
     ]
-    gone = sorted(set(reviewed) - survivors)
-    complaints += [f"{key} is argued about, but it is killed or not made any more" for key in gone]
+    refuted = {key for entry in found.values() for key in entry.get("refuted", ())}
+    complaints += [f"{key} is argued about, but it is killed" for key in sorted(refuted)]
     complaints += [
         f"no words in the argument for {key}" for key, why in reviewed.items() if not why
     ]
+    return complaints
+
+
+def outdated(reviewed: dict[str, str], sources: Iterable[str], root: Path) -> list[str]:
+    """Complaints about arguments for lines that their sources do not have any more."""
+    lines = {Path(source).name: code_lines(root / source) for source in sources}
+    complaints = []
+    for key in reviewed:
+        name, change = key.split(": ", 1)
+        if change.split(" -> ")[0] not in lines.get(name, ()):
+            complaints.append(f"{key} is argued about, but {name} has no such line")
     return complaints
 
 
@@ -248,7 +268,8 @@ def main() -> int:
             KEPT.parent.mkdir(exist_ok=True)
             KEPT.write_text(json.dumps(found), encoding="utf-8")
     found = {source: found[source] for source in plan.tests if source in found}
-    complaints = unreviewed(found, reviewed_survivors())
+    reviewed = reviewed_survivors()
+    complaints = unreviewed(found, reviewed) + outdated(reviewed, plan.tests, ROOT)
     for complaint in complaints:
         print(f"mutants: {complaint}", file=sys.stderr)
     tried = sum(entry["tried"] for entry in found.values())
