@@ -91,6 +91,17 @@ def test_a_reading_of_any_cell_that_is_none_allows_no_current_in_its_period(
             assert rig.step(**{"current_A": current, reading: broken}) == 0.0
 
 
+@pytest.mark.parametrize("asked_A", [math.nan, math.inf, 0.5])
+def test_a_request_that_makes_no_charge_is_refused_by_the_decision_too(asked_A):
+    """As well as by its symptom: neither relies on the other."""
+    rig = loop_of("paper_calibrated", cells=3)
+    current_A = rig.run(20)[-1]
+    assert rig.step(current_A=current_A, reference_current_A=asked_A) == 0.0
+    assert not rig.decision.feasible and rig.decision.current_A == 0.0
+    assert rig.decision.active == lib.RCBF_INVALID
+    assert rig.pack.monitor.active == 1 << lib.FAULT_REQUEST_INVALID
+
+
 def test_a_reading_that_comes_back_lets_the_charge_go_on_and_one_that_stays_out_is_a_fault():
     rig = loop_of("paper_calibrated", cells=4)
     rig.run(20)
