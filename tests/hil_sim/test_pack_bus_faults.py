@@ -20,7 +20,7 @@ from hil_sim.pack.settings import PackChargeSettings
 from hil_sim.pack.summary import margins
 
 ROOT = Path(__file__).parents[2]
-REQUEST_ID = 0x202
+REQUEST_ID, PLUG_IN_ID = 0x202, 0x230
 PRESET, MODEL = load_pair("paper_calibrated", None)
 
 
@@ -109,6 +109,26 @@ def test_an_ecu_that_restarts_in_mid_charge_begins_none_whenever_it_hears_the_re
         heard = wire.hear(ecu.exchange(frames))
         plant.hold(obeyed_A(heard))
         assert period < 100 or heard.command_A == 0.0 or np.isnan(heard.command_A)
+
+
+@pytest.mark.parametrize("page", [0, 1])
+def test_until_every_cell_s_charge_was_told_a_request_is_wrong(page):
+    """An ECU that starts knows of no cell how full it is, whatever its memory had in it."""
+    plant = PackPlant(settings_of())
+    ecu, wire, judged = PackEcu(settings_of()), PackWire(settings_of(), plant), 0
+    for _ in range(30):
+        plant.measure()
+        frames = [
+            frame
+            for frame in wire.publish(charge=True)
+            if frame.frame_id != PLUG_IN_ID or frame.data[1] >> 4 != page
+        ]
+        ecu.exchange(frames)
+        assert ecu.state.command_A == 0.0
+        if ecu.state.has_started:
+            assert ecu.state.pack.monitor.active >> FirstFault.REQUEST_INVALID & 1
+            judged += 1
+    assert judged > 10
 
 
 @pytest.mark.parametrize("off_periods", [1, 2, 4])
