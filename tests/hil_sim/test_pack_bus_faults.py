@@ -43,15 +43,19 @@ def test_without_a_fault_the_same_periods_have_current_and_no_symptom():
     assert set(result.active_faults[10:]) == {0}
 
 
+@pytest.mark.parametrize(
+    ("group_id", "name"),
+    [(0x210, FirstFault.ELECTRICAL_MISSING), (0x220, FirstFault.THERMAL_MISSING)],
+)
 @pytest.mark.parametrize("cell", [0, 2, 3, 15])
-def test_the_page_of_any_cell_is_missed(cell):
+def test_the_page_of_any_cell_is_missed(cell, group_id, name):
     page = cell // 3
 
     def lose(frame, since):
-        is_page = frame.frame_id == 0x210 and frame.data[1] >> 4 == page
+        is_page = frame.frame_id == group_id and frame.data[1] >> 4 == page
         return [] if is_page else [frame]
 
-    fault = PackFault("a page", 0, (FirstFault.ELECTRICAL_MISSING,), delivery=lose)
+    fault = PackFault("a page", 0, (name,), delivery=lose)
     result = run_fault(settings_of(16), fault, 10)
     assert complaint(result, fault) is None
     assert result.faulty_cell == 3 * page + 1
