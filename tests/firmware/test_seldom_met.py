@@ -257,19 +257,28 @@ def test_a_plan_starts_from_what_is_read_now() -> None:
     assert start.cooling_power_W == pytest.approx(0.5, abs=0.01)
 
 
-@pytest.mark.parametrize(("asked_s", "anew"), [(0.0, False), (900.0, True)])
-def test_who_was_in_a_hurry_and_is_no_more_gets_another_plan_at_once(
-    asked_s: float, anew: bool
+@pytest.mark.parametrize(
+    ("planned_s", "asked", "left_s", "anew"),
+    [
+        (0.0, {"TimeToFull": 0.0}, 0.0, False),
+        (900.0, {"TimeToFull": 900.0}, 900.0, False),
+        (0.0, {"TimeToFull": 900.0}, 900.0, True),
+        (900.0, {"TimeToFull": 0.0}, 0.0, True),
+        (0.0, {"Mode": FASTEST}, -1.0, True),
+    ],
+)
+def test_who_asks_for_another_time_gets_another_plan_at_once(
+    planned_s: float, asked: dict[str, float], left_s: float, anew: bool
 ) -> None:
-    bench = Bench(values={**HEALTHY, "Mode": BY_TIME, "TimeToFull": 0.0})
+    bench = Bench(values={**HEALTHY, "Mode": BY_TIME, "TimeToFull": planned_s})
     bench.start()
     for _ in range(5):
         bench.period()
-    assert bench.ecu._state.planner.goal.time_left_s == 0.0
+    assert bench.ecu._state.planner.goal.time_left_s == pytest.approx(planned_s, abs=1.0)
     before_s = bench.ecu._state.planner.age_s
-    bench.period(TimeToFull=asked_s)
+    bench.period(**asked)
     assert (bench.ecu._state.planner.age_s < before_s) is anew
-    assert bench.ecu._state.planner.goal.time_left_s == pytest.approx(asked_s, abs=1.0)
+    assert bench.ecu._state.planner.goal.time_left_s == pytest.approx(left_s, abs=1.0)
 
 
 @pytest.mark.parametrize(
