@@ -322,3 +322,20 @@ def test_firmware_of_version_4_is_as_new_as_the_floor_says(
 )
 def test_the_crc_of_an_image_is_that_of_zip_files(content: bytes) -> None:
     assert lib.image_crc32(content, len(content)) == zlib.crc32(content)
+
+
+@pytest.mark.parametrize(
+    ("reading", "faults"),
+    [
+        ({}, 0),
+        ({"Current": 500.0}, 1 << 4),
+        ({"Voltage": 0.5, "CoolingPower": -19.0}, 1 << 5 | 1 << 8),
+    ],
+)
+def test_bit_n_says_that_the_reading_of_fault_n_is_outside_and_no_other(
+    reading: dict[str, float], faults: int
+) -> None:
+    bench = Bench()
+    bench.start()
+    bench.period(**reading)
+    assert bench.ecu._state.outside == faults
