@@ -48,7 +48,7 @@ def test_without_a_fault_the_same_periods_have_current_and_no_symptom():
     [(0x210, FirstFault.ELECTRICAL_MISSING), (0x220, FirstFault.THERMAL_MISSING)],
 )
 @pytest.mark.parametrize("pages", [(0,), (1,), (5,), (1, 3), (4, 5)])
-def test_any_page_is_missed_and_the_first_cell_of_the_first_one_named(pages, group_id, name):
+def test_the_page_of_any_cell_is_missed(pages, group_id, name):
     def lose(frame, since):
         is_page = frame.frame_id == group_id and frame.data[1] >> 4 in pages
         return [] if is_page else [frame]
