@@ -158,6 +158,18 @@ def test_a_charge_that_is_asked_for_anew_counts_from_states_of_charge_that_were_
         plant.hold(obeyed_A(heard))
 
 
+@pytest.mark.parametrize("cells", [1, 3, 192])
+def test_a_string_of_any_length_is_heard_without_a_symptom(cells):
+    """The longest one fills every page that there is."""
+    plant = PackPlant(settings_of(cells))
+    ecu, wire = PackEcu(settings_of(cells)), PackWire(settings_of(cells), plant)
+    for _ in range(60):
+        plant.measure()
+        ecu.exchange(wire.publish(charge=False))
+        assert (ecu.state.monitor.active, ecu.state.pack.monitor.active) == (0, 0)
+    assert ecu.state.has_started
+
+
 def test_two_commands_in_one_period_move_no_current():
     """The charger's side: the protection proves no sender."""
     ecu, plant = PackEcu(settings_of()), PackPlant(settings_of())
