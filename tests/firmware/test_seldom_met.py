@@ -268,7 +268,7 @@ def test_a_plan_starts_from_what_is_read_now() -> None:
     ],
 )
 def test_who_asks_for_another_time_gets_another_plan_at_once(
-    planned_s: float, asked: dict[str, float], left_s: float, anew: bool
+    planned_s: float, asked: dict[str, Any], left_s: float, anew: bool
 ) -> None:
     bench = Bench(values={**HEALTHY, "Mode": BY_TIME, "TimeToFull": planned_s})
     bench.start()
@@ -333,7 +333,7 @@ def test_the_crc_of_an_image_is_that_of_zip_files(content: bytes) -> None:
     ],
 )
 def test_bit_n_says_that_the_reading_of_fault_n_is_outside_and_no_other(
-    reading: dict[str, float], faults: int
+    reading: dict[str, Any], faults: int
 ) -> None:
     bench = Bench()
     bench.start()
