@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.firmware.mutants.generate import mutants_of
-from tests.firmware.mutants.run import unreviewed
+from tests.firmware.mutants.run import outdated, unreviewed
 from tools.gates.coverage import RECORD as COVERAGE_RECORD
 from tools.gates.coverage import FileCoverage
 from tools.gates.coverage_record import Exclusion, Record, RecordError, load_record
@@ -146,6 +146,9 @@ def test_mutants_are_the_same_each_time_and_change_one_line(tree: Path) -> None:
     assert made == list(mutants_of(SOURCE, tree))
     assert {m.line for m in made} <= {1, 4}, "no comment is changed"
     assert any(m.after == "    return (a <= 3) ? 1 : 0;" for m in made)
+    others = list(mutants_of(SOURCE, tree, "seed"))
+    assert set(made) < set(others) and others != list(mutants_of(SOURCE, tree, "another"))
+    assert any(m.after == "    return (a < 3) ? 0 : 1;" for m in others), "a kind of its own"
     for mutant in made:
         assert mutant.text(tree).count(mutant.before) == 0 or mutant.before in mutant.after
 
@@ -155,7 +158,18 @@ def test_every_survivor_needs_an_argument_and_every_argument_a_survivor() -> Non
     assert unreviewed(found, {"part.c: a -> b": "the same function"}) == []
     (missing,) = unreviewed(found, {})
     assert missing == "no argument for the survivor part.c: a -> b"
-    (gone,) = unreviewed({}, {"part.c: a -> b": "the same function"})
-    assert gone.startswith("part.c: a -> b is argued about, but it is killed")
+    assert unreviewed({}, {"part.c: a -> b": "not drawn"}) == []
+    (wrong,) = unreviewed(
+        found | {SOURCE: {"survivors": [], "refuted": ["part.c: a -> b"]}}, {"part.c: a -> b": "no"}
+    )
+    assert wrong == "part.c: a -> b is argued about, but it is killed"
     (empty,) = unreviewed(found, {"part.c: a -> b": ""})
     assert empty == "no words in the argument for part.c: a -> b"
+
+
+def test_an_argument_ends_with_its_line(tree: Path) -> None:
+    (tree / SOURCE).write_text("int a; /* b */\n")
+    name = Path(SOURCE).name
+    reviewed = {f"{name}: int a;  -> int c; ": "", f"{name}: int b; -> int c;": ""}
+    (gone,) = outdated(reviewed, [SOURCE], tree)
+    assert gone == f"{name}: int b; -> int c; is argued about, but {name} has no such line"

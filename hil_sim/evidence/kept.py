@@ -81,9 +81,13 @@ class KeptCheck:
 
 
 def mutants_hash(root: Path, source: str) -> str:
-    """Hash of a source and of the core's headers, on which its mutants rest."""
+    """Hash of a source and of the core's headers, for a pack's source its own too, on which its
+    mutants rest.
+    """
     digest = hashlib.sha256()
-    folders = ("include", "src", "image", "boot", "port", "port/linux")
+    folders = ["include", "src", "image", "boot", "port", "port/linux"]
+    if source.startswith("firmware_c/pack"):
+        folders += ["pack", "pack/generated", "pack_ecu"]
     headers = [h for f in folders for h in sorted((root / "firmware_c" / f).glob("*.h"))]
     for path in (root / source, *headers):
         digest.update(path.relative_to(root).as_posix().encode() + path.read_bytes())

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from bms.native_build import FIRMWARE, FLAGS, ROOT
+from bms.native_build import FIRMWARE, FLAGS, ROOT, NativeExtension
 
 MODULE_PATH = Path(*FIRMWARE.module.split("."))
 
@@ -21,9 +21,9 @@ class CompiledFirmware:
     extension: Path
 
     @classmethod
-    def build(cls, folder: Path) -> CompiledFirmware:
-        """Compile the extension into a folder and keep its objects."""
-        extension = Path(FIRMWARE.builder(tree=ROOT).compile(tmpdir=str(folder)))
+    def build(cls, folder: Path, native: NativeExtension = FIRMWARE) -> CompiledFirmware:
+        """Compile an extension into a folder and keep its objects."""
+        extension = Path(native.builder(tree=ROOT).compile(tmpdir=str(folder)))
         objects = tuple(sorted(folder.rglob("*.o")))
         assert len({path.name for path in objects}) == len(objects)
         return cls(objects, extension)

@@ -130,6 +130,17 @@ def test_the_voltage_follows_two_slopes(code: FamilyCode, voltage_V: float) -> N
     assert active(code, decision) in ("RCBF_VOLTAGE",)
 
 
+def test_a_current_out_of_the_cell_leaves_no_more_room_than_none(code: FamilyCode) -> None:
+    """It has lowered the voltage already: nothing says that the charge will begin from there."""
+    family, reading = known(code, soc=0.95, voltage_V=3.5)
+    decisions = []
+    for current_A in (0.0, 0.3, 0.9, 5.0):
+        reading.current_A = current_A
+        decisions.append(code.decide(family, reading, 23.0))
+    assert {active(code, decision) for decision in decisions} == {"RCBF_VOLTAGE"}
+    assert len({decision.current_A for decision in decisions}) == 1
+
+
 def test_the_map_is_read_at_the_coldest_surface_and_the_fullest_cell(code: FamilyCode) -> None:
     own = code.of("a123_26650")
     family, reading = known(own, soc=0.85, surface_temperature_K=285.0)

@@ -257,19 +257,28 @@ def test_a_plan_starts_from_what_is_read_now() -> None:
     assert start.cooling_power_W == pytest.approx(0.5, abs=0.01)
 
 
-@pytest.mark.parametrize(("asked_s", "anew"), [(0.0, False), (900.0, True)])
-def test_who_was_in_a_hurry_and_is_no_more_gets_another_plan_at_once(
-    asked_s: float, anew: bool
+@pytest.mark.parametrize(
+    ("planned_s", "asked", "left_s", "anew"),
+    [
+        (0.0, {"TimeToFull": 0.0}, 0.0, False),
+        (900.0, {"TimeToFull": 900.0}, 900.0, False),
+        (0.0, {"TimeToFull": 900.0}, 900.0, True),
+        (900.0, {"TimeToFull": 0.0}, 0.0, True),
+        (0.0, {"Mode": FASTEST}, -1.0, True),
+    ],
+)
+def test_who_asks_for_another_time_gets_another_plan_at_once(
+    planned_s: float, asked: dict[str, Any], left_s: float, anew: bool
 ) -> None:
-    bench = Bench(values={**HEALTHY, "Mode": BY_TIME, "TimeToFull": 0.0})
+    bench = Bench(values={**HEALTHY, "Mode": BY_TIME, "TimeToFull": planned_s})
     bench.start()
     for _ in range(5):
         bench.period()
-    assert bench.ecu._state.planner.goal.time_left_s == 0.0
+    assert bench.ecu._state.planner.goal.time_left_s == pytest.approx(planned_s, abs=1.0)
     before_s = bench.ecu._state.planner.age_s
-    bench.period(TimeToFull=asked_s)
+    bench.period(**asked)
     assert (bench.ecu._state.planner.age_s < before_s) is anew
-    assert bench.ecu._state.planner.goal.time_left_s == pytest.approx(asked_s, abs=1.0)
+    assert bench.ecu._state.planner.goal.time_left_s == pytest.approx(left_s, abs=1.0)
 
 
 @pytest.mark.parametrize(
@@ -313,3 +322,20 @@ def test_firmware_of_version_4_is_as_new_as_the_floor_says(
 )
 def test_the_crc_of_an_image_is_that_of_zip_files(content: bytes) -> None:
     assert lib.image_crc32(content, len(content)) == zlib.crc32(content)
+
+
+@pytest.mark.parametrize(
+    ("reading", "faults"),
+    [
+        ({}, 0),
+        ({"Current": 500.0}, 1 << 4),
+        ({"Voltage": 0.5, "CoolingPower": -19.0}, 1 << 5 | 1 << 8),
+    ],
+)
+def test_bit_n_says_that_the_reading_of_fault_n_is_outside_and_no_other(
+    reading: dict[str, Any], faults: int
+) -> None:
+    bench = Bench()
+    bench.start()
+    bench.period(**reading)
+    assert bench.ecu._state.outside == faults

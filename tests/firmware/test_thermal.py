@@ -108,3 +108,35 @@ def test_nothing_within_the_modelled_uncertainty_reads_as_a_deficit(name: str) -
     assert excess_K.min() >= 0.0
     # These histories come near the bound, so it is not much wider than it has to be.
     assert excess_K.min() < 0.6 * surface_prediction(preset.cell, preset).error_bound_K
+
+
+def test_a_period_is_the_linear_model_of_its_constants() -> None:
+    """Every constant counts, in its own place; the heat is that of the core, not of the surface."""
+    transition = np.array([[0.7, 0.2], [0.3, 0.4]])
+    gain_heat, gain_coolant = np.array([0.013, 0.0017]), np.array([0.1, 0.3])
+    ohm, entropic = 0.05, 3e-3
+    constants = ffi.new(
+        "thermal_constants_t *",
+        {
+            "transition": transition.ravel().tolist(),
+            "gain_K_per_W": gain_heat.tolist(),
+            "gain_coolant": gain_coolant.tolist(),
+            "ohmic_resistance_ohm": ohm,
+            "entropic_coefficient_V_per_K": entropic,
+            "error_bound_K": 0.75,
+        },
+    )
+    state = ffi.new("thermal_t *")
+    lib.thermal_step(state, constants, -20.0, 290.0, 280.0)
+    assert lib.thermal_predicted_surface_K(state) == 290.0, "what came before is not known"
+    rise = np.zeros(2)
+    for current_A, coolant_K in [(-20.0, 290.0), (0.0, 297.0), (15.0, 280.0), (-8.0, 301.0)]:
+        heat_W = ohm * current_A**2 - entropic * (290.0 + rise[0]) * current_A
+        rise = transition @ rise + gain_heat * heat_W + gain_coolant * (coolant_K - 290.0)
+        lib.thermal_step(state, constants, current_A, 333.0, coolant_K)
+        predicted_K = lib.thermal_predicted_surface_K(state)
+        assert predicted_K == pytest.approx(290.0 + rise[1], abs=1e-3)
+        assert state.core_rise_K == pytest.approx(rise[0], abs=1e-3)
+        assert lib.thermal_coldest_surface_K(state, constants) == predicted_K - 0.75
+    lib.thermal_reset(state)
+    assert lib.thermal_predicted_surface_K(state) < -1e30

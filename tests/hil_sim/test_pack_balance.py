@@ -150,13 +150,69 @@ def test_with_a_reading_that_is_no_number_nothing_is_bled(quantity):
     assert not any(rig.bleeds)
 
 
-def test_while_a_current_flows_nothing_is_bled_whoever_drives_it():
+@pytest.mark.parametrize(
+    ("current_A", "bleeds"), [(0.5, False), (-0.15, False), (0.05, True), (-0.05, True)]
+)
+def test_while_a_current_flows_nothing_is_bled_whoever_drives_it(current_A, bleeds):
+    """What its sensor reads without any is no current."""
+
     def tamper(plant):
-        plant.measured.current_A = 0.5
+        plant.measured.current_A = current_A
 
     rig = Rig()
     rig.run(1, tamper=tamper)
-    assert not any(rig.bleeds)
+    assert any(rig.bleeds) is bleeds
+
+
+def test_cells_are_bled_from_the_gap_on_until_they_are_as_empty_as_the_emptiest():
+    rig = Rig()
+    rig.ecu.state.balance.least_soc, rig.ecu.state.balance.least_gap = 0.5, 0.02
+
+    def bled_at(*socs):
+        for i, soc in enumerate(socs):
+            rig.ecu.state.bled_soc[i] = rig.ecu.state.pack.cell[i].soc.soc - soc
+        rig.run(1)
+        return rig.bleeds
+
+    for i in range(CELLS):
+        rig.ecu.state.bleeds[i] = 0
+    assert bled_at(0.9, 0.81, 0.819, 0.821, 0.80, 0.85) == [True, False, False, True, False, True]
+    assert bled_at(0.9, 0.81, 0.821, 0.801, 0.80, 0.80) == [True, False, True, True, False, False]
+    assert bled_at(0.9, 0.81, 0.80, 0.801, 0.80, 0.819) == [True, False, False, True, False, False]
+    assert bled_at(0.6, 0.49, 0.20, 0.51, 0.30, 0.40) == [True, False, False, True, False, False]
+
+
+def test_what_was_bled_is_counted_by_ohms_law():
+    rig = Rig()
+    state, counted = rig.ecu.state, [rig.ecu.state.bled_soc[i] for i in range(CELLS)]
+    expected, least_capacity_As = list(counted), state.pack.calibration.rcbf.capacity_As
+    for _ in range(50):
+        rig.run(1)
+        for i in range(CELLS):
+            charge_As = rig.plant.measured.voltage_V[i] / 10.0 * PRESET.timing.sampling_period_s
+            expected[i] += rig.bleeds[i] * charge_As / least_capacity_As
+    assert any(expected) and expected != counted
+    assert [state.bled_soc[i] for i in range(CELLS)] == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("constant", "values"),
+    [
+        ("resistor_ohm", (0.0, -10.0, math.nan, math.inf)),
+        ("least_soc", (-0.01, 1.01, math.nan)),
+        ("least_gap", (0.0, -0.01, 1.01, math.nan)),
+    ],
+)
+def test_constants_of_balancing_that_cannot_be_let_nothing_be_bled(constant, values):
+    rig = Rig()
+    good = getattr(rig.ecu.state.balance, constant)
+    for value in values:
+        setattr(rig.ecu.state.balance, constant, value)
+        rig.run(1)
+        assert not any(rig.bleeds), value
+        setattr(rig.ecu.state.balance, constant, good)
+        rig.run(1)
+        assert any(rig.bleeds)
 
 
 def test_when_the_bleeds_do_not_come_any_more_the_plant_ends_them():

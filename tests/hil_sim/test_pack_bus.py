@@ -141,7 +141,7 @@ def test_the_core_alone_gives_the_commands_of_the_log_for_the_readings_of_the_lo
         "thermistor_of": owners,
     }
     lib.pack_init(pack, ffi.new("pack_config_t *", config))
-    known, has_started, charging = {}, False, 0
+    known, told, has_started, charging = {}, set(), False, 0
     for asked, answer in periods_of(log):
         known |= decoded(asked)
         said = decoded(answer)
@@ -171,8 +171,57 @@ def test_the_core_alone_gives_the_commands_of_the_log_for_the_readings_of_the_lo
         assert said["CommandState"] == pack.state
         governor = 0 if pack.decision.cell == lib.PACK_NO_CELL else pack.decision.cell + 1
         assert said["GoverningCell"] == governor
+        agrees_with_the_core(said, pack)
+        told |= set(said)
         charging += said["CommandCurrent"] < -1.0
     assert charging > 4000
+    assert told >= {
+        "WeakestCell",
+        "PackState",
+        "LatchedFaults",
+        "PresetHash",
+        "Cell005StateOfCharge",
+    }
+
+
+def agrees_with_the_core(said, pack):
+    """Whatever the ECU says in a period without a fault is what the core has found in it."""
+    cells, decision = [pack.cell[i] for i in range(CELLS)], pack.decision.decision
+    cores = [cell.estimate.core_temperature_K for cell in cells]
+    counted = [cell.soc.soc if pack.soc_known else math.nan for cell in cells]
+    governs = pack.decision.cell != lib.PACK_NO_CELL
+    weakest = pack.decision.cell if governs else int(np.argmax(cores))
+    calibration = pack.calibration
+    numbers = {
+        "WeakestCoreTemperature": cores[weakest],
+        "WeakestStateOfCharge": counted[weakest],
+        "LimitCurrent": decision.lower_A,
+        "HighestStateOfCharge": max(counted),
+        "LowestStateOfCharge": min(counted),
+    }
+    for i in range(CELLS):
+        numbers[f"Cell{i + 1:03d}CoreTemperature"] = cores[i]
+        numbers[f"Cell{i + 1:03d}StateOfCharge"] = counted[i]
+    codes = {
+        "WeakestCell": weakest + 1,
+        "WeakestInDomain": cells[weakest].estimate.in_domain,
+        "GoverningConstraint": decision.active,
+        "Feasible": decision.feasible,
+        "PackState": pack.state,
+        "FirstFault": lib.FAULT_NONE,
+        "FaultyCell": 0,
+        "ActiveFaults": 0,
+        "LatchedFaults": 0,
+        "ModelHash": calibration.model_hash,
+        "PresetHash": calibration.preset_hash >> 16,
+        "Cells": CELLS,
+        "NetworkVersion": int(DATABASE.version),
+    }
+    for name in codes.keys() & said.keys():
+        assert said[name] == codes[name], name
+    for name in numbers.keys() & said.keys():
+        half_step = 0.51 * signal_of(name).scale
+        assert value(said, name) == pytest.approx(numbers[name], abs=half_step, nan_ok=True), name
 
 
 def test_the_charge_over_the_bus_is_that_of_the_study_s_engine_within_the_frames_steps():

@@ -20,7 +20,7 @@ from hil_sim.pack.settings import PackChargeSettings
 from hil_sim.pack.summary import margins
 
 ROOT = Path(__file__).parents[2]
-REQUEST_ID = 0x202
+REQUEST_ID, PLUG_IN_ID = 0x202, 0x230
 PRESET, MODEL = load_pair("paper_calibrated", None)
 
 
@@ -43,18 +43,20 @@ def test_without_a_fault_the_same_periods_have_current_and_no_symptom():
     assert set(result.active_faults[10:]) == {0}
 
 
-@pytest.mark.parametrize("cell", [0, 2, 3, 15])
-def test_the_page_of_any_cell_is_missed(cell):
-    page = cell // 3
-
+@pytest.mark.parametrize(
+    ("group_id", "name"),
+    [(0x210, FirstFault.ELECTRICAL_MISSING), (0x220, FirstFault.THERMAL_MISSING)],
+)
+@pytest.mark.parametrize("pages", [(0,), (1,), (5,), (1, 3), (4, 5)])
+def test_the_page_of_any_cell_is_missed(pages, group_id, name):
     def lose(frame, since):
-        is_page = frame.frame_id == 0x210 and frame.data[1] >> 4 == page
+        is_page = frame.frame_id == group_id and frame.data[1] >> 4 in pages
         return [] if is_page else [frame]
 
-    fault = PackFault("a page", 0, (FirstFault.ELECTRICAL_MISSING,), delivery=lose)
+    fault = PackFault("a page", 0, (name,), delivery=lose)
     result = run_fault(settings_of(16), fault, 10)
     assert complaint(result, fault) is None
-    assert result.faulty_cell == 3 * page + 1
+    assert result.faulty_cell == 3 * pages[0] + 1
 
 
 @pytest.mark.parametrize("kind", ["voltage", "temperature"])
@@ -111,6 +113,26 @@ def test_an_ecu_that_restarts_in_mid_charge_begins_none_whenever_it_hears_the_re
         assert period < 100 or heard.command_A == 0.0 or np.isnan(heard.command_A)
 
 
+@pytest.mark.parametrize("page", [0, 1])
+def test_until_every_cell_s_charge_was_told_a_request_is_wrong(page):
+    """An ECU that starts knows of no cell how full it is, whatever its memory had in it."""
+    plant = PackPlant(settings_of())
+    ecu, wire, judged = PackEcu(settings_of()), PackWire(settings_of(), plant), 0
+    for _ in range(30):
+        plant.measure()
+        frames = [
+            frame
+            for frame in wire.publish(charge=True)
+            if frame.frame_id != PLUG_IN_ID or frame.data[1] >> 4 != page
+        ]
+        ecu.exchange(frames)
+        assert ecu.state.command_A == 0.0
+        if ecu.state.has_started:
+            assert ecu.state.pack.monitor.active >> FirstFault.REQUEST_INVALID & 1
+            judged += 1
+    assert judged > 10
+
+
 @pytest.mark.parametrize("off_periods", [1, 2, 4])
 def test_a_charge_that_is_asked_for_anew_counts_from_states_of_charge_that_were_told_since(
     off_periods,
@@ -134,6 +156,18 @@ def test_a_charge_that_is_asked_for_anew_counts_from_states_of_charge_that_were_
             counted = [ecu.state.pack.cell[cell].soc.soc for cell in range(96)]
             np.testing.assert_array_less(np.array(told) - 1e-4, counted)
         plant.hold(obeyed_A(heard))
+
+
+@pytest.mark.parametrize("cells", [1, 3, 192])
+def test_a_string_of_any_length_is_heard_without_a_symptom(cells):
+    """The longest one fills every page that there is."""
+    plant = PackPlant(settings_of(cells))
+    ecu, wire = PackEcu(settings_of(cells)), PackWire(settings_of(cells), plant)
+    for _ in range(60):
+        plant.measure()
+        ecu.exchange(wire.publish(charge=False))
+        assert (ecu.state.monitor.active, ecu.state.pack.monitor.active) == (0, 0)
+    assert ecu.state.has_started
 
 
 def test_two_commands_in_one_period_move_no_current():

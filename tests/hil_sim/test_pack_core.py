@@ -2,12 +2,14 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from bms.cell import CellFactors
+from bms.model.pair import load_pair
 from hil_sim.studies.pack._pack import ffi, lib
-from hil_sim.studies.pack.engine import NO_CELL, NO_THERMISTOR
-from tests.hil_sim.pack_rig import CHARGING, PackLoop, core_of, ordinary
+from hil_sim.studies.pack.engine import NO_CELL, NO_THERMISTOR, Core
+from tests.hil_sim.pack_rig import CHARGING, PackLoop, PackRig, core_of, ordinary
 
 FAULT, COMPLETE = 5, 4
 VOLTAGE, CORE, INFEASIBLE = 1, 3, 5  # rcbf_active_t
@@ -89,6 +91,17 @@ def test_a_reading_of_any_cell_that_is_none_allows_no_current_in_its_period(
             assert rig.pack.symptom_cell == cell
         else:
             assert rig.step(**{"current_A": current, reading: broken}) == 0.0
+
+
+@pytest.mark.parametrize("asked_A", [math.nan, math.inf, 0.5])
+def test_a_request_that_makes_no_charge_is_refused_by_the_decision_too(asked_A):
+    """As well as by its symptom: neither relies on the other."""
+    rig = loop_of("paper_calibrated", cells=3)
+    current_A = rig.run(20)[-1]
+    assert rig.step(current_A=current_A, reference_current_A=asked_A) == 0.0
+    assert not rig.decision.feasible and rig.decision.current_A == 0.0
+    assert rig.decision.active == lib.RCBF_INVALID
+    assert rig.pack.monitor.active == 1 << lib.FAULT_REQUEST_INVALID
 
 
 def test_a_reading_that_comes_back_lets_the_charge_go_on_and_one_that_stays_out_is_a_fault():
@@ -202,3 +215,49 @@ def test_the_first_cell_that_admits_no_current_refuses_it_for_all_and_is_named()
     assert loop.run(1) == [0.0]
     assert not loop.decision.feasible
     assert (loop.decision.active, loop.pack.decision.cell) == (INFEASIBLE, 1)
+
+
+def test_the_surface_of_a_bare_cell_is_bounded_by_the_heat_that_its_own_voltage_admits():
+    """Of the linear model from the hottest reading, with the warmest coolant that passes it."""
+    preset, model = load_pair("paper_calibrated", None)
+    rig = PackRig(Core(preset, model, ordinary("paper_calibrated")), 3, bare=(1,))
+    bare, k = rig.core.reserves.bare, rig.pack.calibration
+    thermal, cell = k.thermal, rig.pack.cell[1]
+    matrix = np.array(list(thermal.transition)).reshape(2, 2)
+    gain_heat, gain_coolant = (
+        np.array(list(thermal.gain_K_per_W)),
+        np.array(list(thermal.gain_coolant)),
+    )
+    most_ohm = bare["resistance_factor"] * thermal.ohmic_resistance_ohm
+    inlet_K, outlet_K, start_K = 297.0, 303.0, 305.0
+    rig.surfaces, greatest_W = [301.0, start_K], 0.0
+    rig.step(coolant_in_K=inlet_K, coolant_out_K=outlet_K)
+    rig.step(charge=True)
+    assert rig.pack.soc_known and cell.thermal.is_known
+    rise = gain_coolant * (inlet_K + 2.0 / 3.0 * (outlet_K - inlet_K) - start_K)
+    seen = set()
+    for current_A, above_V in [(0.0, 0.0), (-20.0, 0.9), (-12.0, 0.05), (-6.0, -0.2), (-9.0, 0.3)]:
+        soc = cell.soc.soc
+        rig.voltages[1] = (
+            lib.rcbf_open_circuit_voltage_V(ffi.addressof(k, "rcbf"), soc - bare["soc_error"])
+            + above_V
+        )
+        rig.step(current_A=current_A)
+        strength_A = -current_A - bare["current_error_A"]
+        ohm = most_ohm
+        if strength_A > 0.0:
+            ohm = min(most_ohm, max(0.0, (above_V + bare["voltage_error_V"]) / strength_A))
+        seen.add("most" if ohm == most_ohm else "none" if ohm == 0.0 else "seen")
+
+        def heat_W(core_rise_K, ohm=ohm, current_A=current_A):
+            entropic_V = thermal.entropic_coefficient_V_per_K * (start_K + core_rise_K)
+            return ohm * current_A**2 - entropic_V * current_A
+
+        coolant_K = inlet_K + 2.0 / 3.0 * (outlet_K - inlet_K) - start_K
+        rise = matrix @ rise + gain_heat * heat_W(rise[0]) + gain_coolant * coolant_K
+        greatest_W = max(greatest_W, heat_W(rise[0]))
+        assert cell.greatest_heat_W == pytest.approx(greatest_W, rel=1e-3, abs=1e-3)
+        assert cell.estimate.core_temperature_K == pytest.approx(start_K + rise[0], abs=1e-3)
+        above_K = bare["surface_K"] + bare["estimate_K"] + bare["surface_K_per_W"] * greatest_W
+        assert cell.surface_temperature_K == pytest.approx(start_K + rise[1] + above_K, abs=1e-3)
+    assert seen == {"most", "none", "seen"}

@@ -1,11 +1,12 @@
 """Tries mutants of the C core on the tests of each source, and holds the survivors to the reviewed.
 
-    python -m tests.firmware.mutants.run [SOURCE...] [--all] [--survivors]
+    python -m tests.firmware.mutants.run [SOURCE...] [--all] [--survivors] [--seed WORD]
 
 A process that has loaded what the tests need beside the firmware forks for each mutant. A mutant is
 killed by the first test that fails, by a crash, or by time. build/mutants.json keeps what was
 found for each source; a source that has not changed since is not tried again. A survivor has to
-stand in survivors.toml, with what makes it equivalent or harmless; else the run fails.
+stand in survivors.toml, with what makes it equivalent or harmless; else the run fails. With a seed
+the sample is another one, of more kinds of changes, and nothing of it is kept.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import get_context
@@ -29,8 +30,11 @@ from typing import Any
 import hypothesis
 import pytest
 
-from bms.native_build import ROOT
-from tests.firmware.mutants.build import Built, Factory, compiled_firmware, sources_hash
+from bms.native_build import FIRMWARE, ROOT
+from hil_sim.studies.pack.native_build import PACK
+from tests.firmware.mutants.build import Built, Factory, extension_of, sources_hash
+from tests.firmware.mutants.generate import code_lines
+from tests.firmware.mutation import CompiledFirmware
 from tests.firmware.native_library import VARIANT
 
 if sys.version_info >= (3, 11):
@@ -40,7 +44,18 @@ else:
 
 HERE = Path(__file__).parent
 KEPT = ROOT / "build" / "mutants.json"
-LEFT_OUT = "not mutant and not emulat and not taken_away and not broken_rule"
+LEFT_OUT = " and ".join(
+    f"not {part}"
+    for part in (
+        "mutant",
+        "emulat",
+        "taken_away",
+        "broken_rule",
+        "without_its",
+        "without_a_condition",
+    )
+)
+"""Tests that build firmware of their own, or a board."""
 _NOT_RUN = (
     pytest.ExitCode.INTERNAL_ERROR,
     pytest.ExitCode.USAGE_ERROR,
@@ -68,9 +83,9 @@ class Plan:
     def load(cls) -> Plan:
         return cls(**tomllib.loads((HERE / "plan.toml").read_text(encoding="utf-8")))
 
-    def all_tests(self) -> list[str]:
-        """Every test file of the plan, once."""
-        return sorted({name for names in self.tests.values() for name in names})
+    def tests_of(self, sources: Iterable[str]) -> list[str]:
+        """Every test of some sources, once."""
+        return sorted({name for source in sources for name in self.tests[source]})
 
     def number(self, source: str) -> int:
         """How many mutants of a source are tried."""
@@ -93,6 +108,12 @@ def register_profile() -> None:
     )
 
 
+def _file(name: str) -> str:
+    """Test file of a name in the plan: one of the firmware, where no folder stands before."""
+    folder, _, stem = name.rpartition("/")
+    return f"tests/{folder or 'firmware'}/test_{stem}{'' if '::' in name else '.py'}"
+
+
 def survives(built: Built | None, tests: Sequence[str], longest_s: int) -> bool:
     """Whether all tests pass with the mutant, or with none, in a process of its own.
 
@@ -112,8 +133,11 @@ def survives(built: Built | None, tests: Sequence[str], longest_s: int) -> bool:
         options = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "-k", LEFT_OUT]
         options += [f"--hypothesis-profile={PROFILE}"]
         if built is not None and built.extension is not None:
-            options += ["--firmware-build", str(built.extension)]
-        files = [f"tests/firmware/test_{name}{'' if '::' in name else '.py'}" for name in tests]
+            if built.native is FIRMWARE:
+                options += ["--firmware-build", str(built.extension)]
+            else:
+                built.native.load_build(built.extension)
+        files = [_file(name) for name in tests]
         os._exit(int(pytest.main([*options, *files])))
     until = time.monotonic() + 20 * longest_s  # of one that waits for what does not come
     while time.monotonic() < until:
@@ -136,7 +160,8 @@ def try_source(
 
     With `only`, all but those count as killed without being tried.
     """
-    killed, survivors, start_s = 0, [], time.monotonic()
+    killed, survivors, refuted, start_s = 0, [], [], time.monotonic()
+    argued = reviewed_survivors()
     longest_s = plan.longest_s * len(plan.tests[source])
     for built in islice(factory.built(source), number):
         is_tried = not only or built.mutant.key in only
@@ -145,6 +170,8 @@ def try_source(
             print(f"survives: {source}:{built.mutant.line}: {built.mutant.key}", file=sys.stderr)
         else:
             killed += 1
+            if is_tried and built.mutant.key in argued:
+                refuted.append(built.mutant.key)
     took = f"{killed} killed, {len(survivors)} survive, {time.monotonic() - start_s:.0f} s"
     print(f"{source}: {took}", file=sys.stderr, flush=True)
     return source, {
@@ -152,6 +179,7 @@ def try_source(
         "tried": killed + len(survivors),
         "killed": killed,
         "survivors": sorted(survivors),
+        "refuted": sorted(refuted),
     }
 
 
@@ -160,16 +188,30 @@ def _try(task: tuple[str, Factory, Plan, int | None, frozenset[str]]) -> tuple[s
 
 
 def unreviewed(found: dict[str, Any], reviewed: dict[str, str]) -> list[str]:
-    """Survivors that nobody has argued about, and arguments about mutants that are killed."""
+    """Survivors that nobody has argued about, and arguments about mutants that are killed.
+
+    An argument about a mutant that was not drawn stays, for as long as its line is in its source.
+    """
     survivors = {key for entry in found.values() for key in entry["survivors"]}
     complaints = [
         f"no argument for the survivor {key}" for key in sorted(survivors - set(reviewed))
     ]
-    gone = sorted(set(reviewed) - survivors)
-    complaints += [f"{key} is argued about, but it is killed or not made any more" for key in gone]
+    refuted = {key for entry in found.values() for key in entry.get("refuted", ())}
+    complaints += [f"{key} is argued about, but it is killed" for key in sorted(refuted)]
     complaints += [
         f"no words in the argument for {key}" for key, why in reviewed.items() if not why
     ]
+    return complaints
+
+
+def outdated(reviewed: dict[str, str], sources: Iterable[str], root: Path) -> list[str]:
+    """Complaints about arguments for lines that their sources do not have any more."""
+    lines = {Path(source).name: code_lines(root / source) for source in sources}
+    complaints = []
+    for key in reviewed:
+        name, change = key.split(": ", 1)
+        if change.split(" -> ")[0] not in lines.get(name, ()):
+            complaints.append(f"{key} is argued about, but {name} has no such line")
     return complaints
 
 
@@ -193,10 +235,11 @@ def main() -> int:
     parser.add_argument("sources", nargs="*", help="try these, changed or not")
     parser.add_argument("--all", action="store_true", help="every source, every mutant: hours")
     parser.add_argument("--survivors", action="store_true", help="try those again, no others")
+    parser.add_argument("--seed", default="", help="another sample, of more kinds; it is not kept")
     parser.add_argument("--jobs", type=int, default=2, help="sources at a time")
     arguments = parser.parse_args()
     os.chdir(ROOT)
-    plan, found = Plan.load(), kept()
+    plan, found = Plan.load(), {} if arguments.seed else kept()
     wanted = arguments.sources or [
         source
         for source in plan.tests
@@ -214,20 +257,31 @@ def main() -> int:
     wanted.sort(key=plan.number, reverse=True)
     prepare()
     with tempfile.TemporaryDirectory() as folder, get_context("fork").Pool(arguments.jobs) as pool:
-        firmware = compiled_firmware(Path(folder) / "firmware")
-        if wanted and not survives(None, plan.all_tests(), 10 * plan.longest_s):
+        compiled = {
+            native.module: CompiledFirmware.build(Path(folder) / native.module, native)
+            for native in (FIRMWARE, PACK)
+        }
+        tests = plan.tests_of(wanted)
+        if wanted and not survives(None, tests, plan.longest_s * len(tests)):
             print("mutants: the tests fail without any", file=sys.stderr)
             return 1
-        factories = [Factory(firmware, Path(folder) / str(i)) for i in range(len(wanted))]
+        natives = [extension_of(source) for source in wanted]
+        factories = [
+            Factory(compiled[native.module], Path(folder) / str(i), native, arguments.seed)
+            for i, native in enumerate(natives)
+        ]
         numbers = [None if arguments.all else plan.number(source) for source in wanted]
         keys = [again[source] for source in wanted]
         tasks = zip(wanted, factories, [plan] * len(wanted), numbers, keys)
         for source, entry in pool.imap_unordered(_try, tasks):
             found[source] = entry
+            if arguments.seed:
+                continue
             KEPT.parent.mkdir(exist_ok=True)
             KEPT.write_text(json.dumps(found), encoding="utf-8")
     found = {source: found[source] for source in plan.tests if source in found}
-    complaints = unreviewed(found, reviewed_survivors())
+    reviewed = reviewed_survivors()
+    complaints = unreviewed(found, reviewed) + outdated(reviewed, plan.tests, ROOT)
     for complaint in complaints:
         print(f"mutants: {complaint}", file=sys.stderr)
     tried = sum(entry["tried"] for entry in found.values())
