@@ -213,6 +213,10 @@ MUTANTS = {
         [LATE],
         ["voltage page a period late", "temperature page a period late"],
     ),
+    "phase of messages": (
+        [(NETWORK, "ecu->is_usable[i] = false;", "ecu->is_usable[i] = true;")],
+        ["coolant a period late", "request a period late"],
+    ),
     "number of cells": (
         [(NETWORK, "ecu->is_disturbed = true;\n        return true;", "return true;")],
         ["page of cells that are not there"],
