@@ -35,6 +35,7 @@ def ecu(
     cells: pack_options.CellsOption = None,
     spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
     per_thermistor: pack_options.PerThermistorOption = 1,
+    thermistors: pack_options.ThermistorsOption = None,
 ) -> int:
     """Run the firmware on a CAN bus until the bus falls silent, or until Ctrl-C or SIGTERM.
 
@@ -47,9 +48,11 @@ def ecu(
         from hil_sim.commands import pack_charge  # noqa: PLC0415 (plots and solvers)
 
         pack_options.refuse_options({"--realtime": realtime})
-        chosen = pack_charge.pack_settings(preset, model, cells, bus, spread, per_thermistor)
+        chosen = pack_charge.pack_settings(
+            preset, model, cells, bus, spread, per_thermistor, thermistors=thermistors
+        )
         return pack_charge.ecu_pack(chosen, silence_s)
-    pack_options.refuse_pack_options(spread, per_thermistor)
+    pack_options.refuse_pack_options(spread, per_thermistor, thermistors)
     require_shared(bus)
     firmware = Ecu(preset=preset, model=model)
     stop = stop_event()
