@@ -17,6 +17,8 @@ BEGIN_PERIOD = 150
 """Since the start, when the charge has its full current."""
 CELL = 4
 """The cell that faults are of, from 0 on; its page is that of 3 to 5."""
+LEAST_CELLS = 6
+"""That a pack with this page has."""
 VOLTAGE_ID, TEMPERATURE_ID, PLUG_IN_ID = 0x210, 0x220, 0x230
 COOLANT_ID, REQUEST_ID = 0x201, 0x202
 _PAGE = 1
@@ -190,7 +192,7 @@ def _no_coolant(plant: PackPlant, since: int, kept: dict[str, float]) -> None:
 
 
 MISSING_V, MISSING_T = FirstFault.ELECTRICAL_MISSING, FirstFault.THERMAL_MISSING
-CORRUPTED = FirstFault.CORRUPTED_FRAMES
+CORRUPTED, DEVIATION = FirstFault.CORRUPTED_FRAMES, FirstFault.VOLTAGE_DEVIATION
 VOLTAGE, SURFACE = FirstFault.VOLTAGE_RANGE, FirstFault.SURFACE_RANGE
 FAULTS = (
     PackFault("voltage page missing", 0, (MISSING_V,), delivery=_missing(VOLTAGE_ID)),
@@ -218,7 +220,7 @@ FAULTS = (
     PackFault("a cell's voltage out of range", 0, (VOLTAGE,), reading=_set_voltage(6.0)),
     PackFault("a cell's voltage off by 0.3 V", 0, (VOLTAGE,), reading=_off_voltage),
     PackFault("the string's voltage off by 1 V", 0, (VOLTAGE,), reading=_off_string),
-    PackFault("a cell's voltage stuck", 600, (VOLTAGE,), reading=_stuck_voltage),
+    PackFault("a cell's voltage stuck", 600, (VOLTAGE, DEVIATION), reading=_stuck_voltage),
     PackFault("thermistor wire open", 0, (SURFACE,), reading=_set_surface(math.nan)),
     PackFault("thermistor reads its lowest", 0, (SURFACE,), reading=_set_surface(200.0)),
     PackFault("thermistor stuck", 600, (FirstFault.SURFACE_DEFICIT,), reading=_stuck_surface),
