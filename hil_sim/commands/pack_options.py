@@ -82,6 +82,11 @@ def refuse_pack_options(
     refuse_without_cells("--thermistors", thermistors is not None)
 
 
+def refuse_balancing(bleed_ohm: float, balance_s: float = 0.0) -> None:
+    """Raise InputError for balancing without --cells."""
+    refuse_without_cells("--bleed-ohm, --balance-s", bleed_ohm != 0.0 or balance_s != 0.0)
+
+
 def refuse_without_cells(options: str, is_given: bool) -> None:
     """Raise InputError where one of these options is given."""
     if is_given:

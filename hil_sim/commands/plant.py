@@ -42,6 +42,8 @@ def plant(
     spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
     per_thermistor: pack_options.PerThermistorOption = 1,
     thermistors: pack_options.ThermistorsOption = None,
+    bleed_ohm: pack_options.BleedOption = 0.0,
+    balance_s: pack_options.BalanceOption = 0.0,
     model: ModelOption = None,
 ) -> int:
     """Charge a simulated cell with whatever ECU is on the bus, for example `bms ecu`.
@@ -79,8 +81,10 @@ def plant(
             answer_timeout_s,
             thermistors,
         )
+        chosen = replace(chosen, bleed_ohm=bleed_ohm, balance_s=balance_s)
         return pack_charge.plant_pack(chosen, out, as_json, log)
     pack_options.refuse_pack_options(spread, per_thermistor, thermistors)
+    pack_options.refuse_balancing(bleed_ohm, balance_s)
     if model is not None:
         raise InputError(f"--model {model}: is what a pack's ECU has to have; add --cells")
     settings = charge_settings(

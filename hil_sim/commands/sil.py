@@ -100,8 +100,7 @@ def sil(
         chosen = replace(chosen, bleed_ohm=bleed_ohm, balance_s=balance_s)
         return pack_charge.sil_pack(chosen, out, as_json, log)
     pack_options.refuse_pack_options(spread, per_thermistor, thermistors)
-    is_balancing = bleed_ohm != 0.0 or balance_s != 0.0
-    pack_options.refuse_without_cells("--bleed-ohm, --balance-s", is_balancing)
+    pack_options.refuse_balancing(bleed_ohm, balance_s)
     with ExitStack() as stack:
         if target is not None:
             if bus != Settings.bus:
