@@ -178,8 +178,7 @@ static void follow_request(pack_t *pack, const pack_readings_t *readings, uint32
         }
     } else if ((pack->state == BMS_STANDBY) && pack->may_start && (symptoms == 0u)) {
         for (uint32_t i = 0u; i < pack->cells; i++) {
-            const pack_cell_reading_t reading = pack_cell_reading(pack, readings, i);
-            pack_cell_begin(pack, i, &reading, readings->plug_in_soc[i]);
+            pack_cell_begin(pack, readings, i);
         }
         pack->soc_known = true;
         pack->may_start = false;

@@ -64,13 +64,15 @@ typedef struct {
     bool charge;           /* asked for */
     float reference_current_A;
     const float *plug_in_soc; /* of each cell; read where a charge is asked for */
+    const float *bled_soc;    /* of each cell, since the last charge; NULL for none */
 } pack_readings_t;
 
 typedef struct {
     float open_circuit_voltage_V; /* of its state of charge */
     float surface_temperature_K;  /* measured and no colder than the heat allows, or the bound */
     float greatest_heat_W;        /* of a cell without a thermistor, so far */
-    soc_t soc;
+    soc_t soc;                    /* no less than the cell's, wherever it was told or counted from */
+    float untold_soc;             /* by which the charge began above what was told */
     history_t history;
     thermal_t thermal;
     kan_estimate_t estimate;

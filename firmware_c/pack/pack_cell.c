@@ -1,5 +1,7 @@
 #include "pack_cell.h"
 
+#include <stddef.h>
+
 #include "numeric.h"
 
 /* A reading just outside of the box, by no more than its error, is taken for one on its face. */
@@ -28,7 +30,8 @@ static float greatest_resistance_ohm(const pack_t *pack, pack_cell_t *cell,
         return most_ohm;
     }
     const float least_V = rcbf_open_circuit_voltage_near_V(
-        &calibration->rcbf, cell->soc.soc - bare->soc_error, &cell->bare_segment);
+        &calibration->rcbf, cell->soc.soc - cell->untold_soc - bare->soc_error,
+        &cell->bare_segment);
     const float seen_ohm = (reading->voltage_V + bare->voltage_error_V - least_V) / strength_A;
     return (seen_ohm < most_ohm) ? numeric_larger(seen_ohm, 0.0f) : most_ohm;
 }
@@ -119,6 +122,18 @@ family_reading_t pack_family_reading(const pack_t *pack, const pack_cell_reading
     };
 }
 
+/* While no charge runs, a current that may be the sensor's offset is none: it would add up for as
+ * long as the pack stands. */
+static void count_charge(const pack_t *pack, pack_cell_t *cell, float current_A)
+{
+    const bms_calibration_t *calibration = pack->calibration;
+    const bool is_charging = pack_is_charging(pack);
+    if (is_charging || (fabsf(current_A) > PACK_REST_A)) {
+        soc_count(&cell->soc, current_A, is_charging ? pack->command_A : current_A,
+                  calibration->sampling_period_s, calibration->rcbf.capacity_As);
+    }
+}
+
 void pack_cell_update(pack_t *pack, uint32_t index, const pack_cell_reading_t *reading,
                       float start_K)
 {
@@ -139,25 +154,43 @@ void pack_cell_update(pack_t *pack, uint32_t index, const pack_cell_reading_t *r
         family_observe(&pack->family[index], &calibration->family, &calibration->rcbf, &known);
     }
     if (pack->soc_known) {
-        const float commanded_A = pack_is_charging(pack) ? pack->command_A : current_A;
-        soc_count(&cell->soc, current_A, commanded_A, calibration->sampling_period_s,
-                  calibration->rcbf.capacity_As);
+        count_charge(pack, cell, current_A);
         look_up_voltage(pack, cell);
     }
 }
 
-void pack_cell_begin(pack_t *pack, uint32_t index, const pack_cell_reading_t *reading,
-                     float plug_in_soc)
+/* The most that was told or counted bounds every cell of the family from above, and the rest of its
+ * bounds what was told. */
+static void begin_family(pack_t *pack, const pack_readings_t *readings, uint32_t index)
+{
+    const bms_calibration_t *calibration = pack->calibration;
+    const pack_cell_reading_t reading = pack_cell_reading(pack, readings, index);
+    const family_reading_t known = pack_family_reading(pack, &reading, index);
+    family_t *family = &pack->family[index];
+    family_begin(family, &calibration->family, &calibration->rcbf, readings->plug_in_soc[index],
+                 &known);
+    if (pack->cell[index].untold_soc > 0.0f) {
+        const float most_soc = pack->cell[index].soc.soc + calibration->family.plug_in_error;
+        family->soc_high.soc =
+            numeric_larger(family->soc_high.soc, numeric_smaller(most_soc, 1.0f));
+    }
+}
+
+void pack_cell_begin(pack_t *pack, const pack_readings_t *readings, uint32_t index)
 {
     pack_cell_t *cell = &pack->cell[index];
-    const bms_calibration_t *calibration = pack->calibration;
-    soc_set(&cell->soc, plug_in_soc);
+    const float told_soc = readings->plug_in_soc[index];
+    float begin_soc = told_soc;
+    if (pack->soc_known) {
+        const float bled_soc = (readings->bled_soc != NULL) ? readings->bled_soc[index] : 0.0f;
+        begin_soc = numeric_larger(cell->soc.soc - bled_soc, told_soc);
+    }
+    soc_set(&cell->soc, begin_soc);
+    cell->untold_soc = begin_soc - told_soc;
     look_up_voltage(pack, cell);
     cell->decision_segment = cell->ocv_segment;
     if (pack_has_family(pack)) {
-        const family_reading_t known = pack_family_reading(pack, reading, index);
-        family_begin(&pack->family[index], &calibration->family, &calibration->rcbf, plug_in_soc,
-                     &known);
+        begin_family(pack, readings, index);
     }
 }
 

@@ -6,6 +6,9 @@
 
 #include "pack.h"
 
+/* A pack whose current is no more than this is at rest. */
+#define PACK_REST_A 0.1f
+
 /* What the readings of a period are to one cell. */
 typedef struct {
     float current_A;
@@ -51,9 +54,9 @@ family_reading_t pack_family_reading(const pack_t *pack, const pack_cell_reading
 void pack_cell_update(pack_t *pack, uint32_t index, const pack_cell_reading_t *reading,
                       float start_K);
 
-/* Begins a charge at a state of charge. */
-void pack_cell_begin(pack_t *pack, uint32_t index, const pack_cell_reading_t *reading,
-                     float plug_in_soc);
+/* Begins a charge at the state of charge that is told, or that was counted since the charge before
+ * less what was bled, where that is more: what is told may be of the past. */
+void pack_cell_begin(pack_t *pack, const pack_readings_t *readings, uint32_t index);
 
 bool pack_cell_is_full(const pack_t *pack, uint32_t index);
 

@@ -26,4 +26,4 @@ ANSWERS_OBJECTS := $(subst /pack_ecu_cost.o,/pack_answers.o,$(PACK_ECU_OBJECTS))
 $(BUILD)/pack_answers.elf: $(ANSWERS_OBJECTS) $F/pack_cost/pack_cost.ld $F/linker/ram.ld
 	@$(CROSS)gcc $(LINK_WHOLE) $(LDFLAGS) -T $F/pack_cost/pack_cost.ld $(ANSWERS_OBJECTS) -lm -o $@
 
-$(PACK_ECU_OBJECTS) $(ANSWERS_OBJECTS): $(wildcard $F/pack/*.h $F/pack/generated/*.h $F/pack_ecu/*.h)
+$(PACK_OBJECTS) $(PACK_ECU_OBJECTS) $(ANSWERS_OBJECTS): $(wildcard $F/pack/*.h $F/pack/generated/*.h $F/pack_ecu/*.h)

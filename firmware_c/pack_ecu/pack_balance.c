@@ -7,9 +7,6 @@
 #include "numeric.h"
 #include "pack_cell.h"
 
-/* A pack whose current is no more than this is at rest. */
-#define REST_A 0.1f
-
 static float soc_of(const pack_ecu_t *ecu, uint32_t cell)
 {
     return ecu->pack.cell[cell].soc.soc - ecu->bled_soc[cell];
@@ -40,7 +37,7 @@ static bool may_bleed(const pack_ecu_t *ecu)
                               pack->monitor.latched;
     return is_possible(&ecu->balance) && ecu->has_started && (pack->calibration != NULL) &&
            pack->soc_known && (symptoms == 0u) && (ecu->command_A == 0.0f) &&
-           (fabsf(ecu->current_A) <= REST_A) &&
+           (fabsf(ecu->current_A) <= PACK_REST_A) &&
            ((pack->state == BMS_STANDBY) || (pack->state == BMS_COMPLETE));
 }
 
@@ -56,12 +53,15 @@ static bool is_to_bleed(const pack_ecu_t *ecu, uint32_t cell, float lowest_soc)
 
 static void bleed_none(pack_ecu_t *ecu)
 {
-    const bool is_anew = pack_is_charging(&ecu->pack);
     for (uint32_t i = 0u; i < ecu->pack.cells; i++) {
         ecu->bleeds[i] = 0u;
-        if (is_anew) {
-            ecu->bled_soc[i] = 0.0f;
-        }
+    }
+}
+
+void pack_balance_begin(pack_ecu_t *ecu)
+{
+    for (uint32_t i = 0u; i < ecu->pack.cells; i++) {
+        ecu->bled_soc[i] = 0.0f;
     }
 }
 

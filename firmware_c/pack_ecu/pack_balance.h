@@ -9,6 +9,9 @@
 
 #include "pack_ecu.h"
 
+/* A charge has begun with what was bled until then. */
+void pack_balance_begin(pack_ecu_t *ecu);
+
 /* After the core's step of a period: who is bled until the next one. */
 void pack_balance_step(pack_ecu_t *ecu);
 

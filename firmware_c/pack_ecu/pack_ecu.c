@@ -80,8 +80,13 @@ static void step_core(pack_ecu_t *ecu)
         .charge = ecu->is_asked && (ecu->monitor.latched == 0u),
         .reference_current_A = is_stopped(ecu) ? 0.0f : ecu->reference_current_A,
         .plug_in_soc = ecu->plug_in_soc,
+        .bled_soc = ecu->bled_soc,
     };
+    const bool could_start = ecu->pack.may_start;
     pack_step(&ecu->pack, &readings);
+    if (could_start && !ecu->pack.may_start) {
+        pack_balance_begin(ecu);
+    }
 }
 
 static void note_faults(pack_ecu_t *ecu)

@@ -69,7 +69,8 @@ typedef struct {
     e2e_receiver_t receiver[PACK_ECU_MESSAGES];
     bool is_usable[PACK_ECU_MESSAGES];
     e2e_receiver_t page[PACK_ECU_RECEIVED][(BMS_MAX_CELLS + 2) / 3];
-    /* By how much a page's counter is ahead of PackElectrical's, since before the charge. */
+    /* By how much a counter is ahead of PackElectrical's, since before the charge. */
+    uint8_t message_phase[PACK_ECU_MESSAGES];
     uint8_t phase[PACK_ECU_SUPERVISED][(BMS_MAX_CELLS + 2) / 3];
     uint8_t plug_in_age[(BMS_MAX_CELLS + 2) / 3]; /* in periods */
     bool is_disturbed; /* a frame of this period was refused, or is of cells that are not there */

@@ -169,6 +169,21 @@ static bool is_late(const pack_ecu_t *ecu, uint8_t *phase, uint8_t counter)
     return ahead != *phase;
 }
 
+static void judge_messages(pack_ecu_t *ecu)
+{
+    for (uint32_t i = 0u; i < PACK_RECEIVED_COUNT; i++) {
+        const e2e_verdict_t verdict = e2e_supervise(&ecu->receiver[i], &PACK_RECEIVED[i].policy);
+        ecu->is_usable[i] = verdict.is_usable;
+        ecu->is_disturbed = ecu->is_disturbed || verdict.is_disturbed;
+    }
+    for (uint32_t i = 0u; i < PACK_RECEIVED_COUNT; i++) {
+        if (ecu->is_usable[i] &&
+            is_late(ecu, &ecu->message_phase[i], ecu->receiver[i].counter)) {
+            ecu->is_usable[i] = false;
+        }
+    }
+}
+
 static void judge_pages(pack_ecu_t *ecu, uint32_t group)
 {
     const uint32_t pages = pack_pages(count_of(ecu, group));
@@ -214,11 +229,7 @@ void pack_network_forget_plug_in(pack_ecu_t *ecu)
 void pack_network_step(pack_ecu_t *ecu)
 {
     ecu->missing_cell = PACK_NO_CELL;
-    for (uint32_t i = 0u; i < PACK_RECEIVED_COUNT; i++) {
-        const e2e_verdict_t verdict = e2e_supervise(&ecu->receiver[i], &PACK_RECEIVED[i].policy);
-        ecu->is_usable[i] = verdict.is_usable;
-        ecu->is_disturbed = ecu->is_disturbed || verdict.is_disturbed;
-    }
+    judge_messages(ecu);
     for (uint32_t group = 0u; group < PACK_ECU_SUPERVISED; group++) {
         judge_pages(ecu, group);
     }

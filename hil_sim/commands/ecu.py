@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from typing import Annotated
 
 import typer
@@ -35,11 +36,13 @@ def ecu(
     cells: pack_options.CellsOption = None,
     spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
     per_thermistor: pack_options.PerThermistorOption = 1,
+    thermistors: pack_options.ThermistorsOption = None,
+    bleed_ohm: pack_options.BleedOption = 0.0,
 ) -> int:
     """Run the firmware on a CAN bus until the bus falls silent, or until Ctrl-C or SIGTERM.
 
     Waits for the first frame as long as it takes. With --cells it is the ECU of a pack, which has
-    what cells that differ by --spread need in reserve.
+    what cells that differ by --spread need in reserve; with --bleed-ohm it balances them.
 
     Example: bms ecu --bus socketcan:vcan0 --silence-s 10
     """
@@ -47,9 +50,12 @@ def ecu(
         from hil_sim.commands import pack_charge  # noqa: PLC0415 (plots and solvers)
 
         pack_options.refuse_options({"--realtime": realtime})
-        chosen = pack_charge.pack_settings(preset, model, cells, bus, spread, per_thermistor)
-        return pack_charge.ecu_pack(chosen, silence_s)
-    pack_options.refuse_pack_options(spread, per_thermistor)
+        chosen = pack_charge.pack_settings(
+            preset, model, cells, bus, spread, per_thermistor, thermistors=thermistors
+        )
+        return pack_charge.ecu_pack(replace(chosen, bleed_ohm=bleed_ohm), silence_s)
+    pack_options.refuse_pack_options(spread, per_thermistor, thermistors)
+    pack_options.refuse_balancing(bleed_ohm)
     require_shared(bus)
     firmware = Ecu(preset=preset, model=model)
     stop = stop_event()

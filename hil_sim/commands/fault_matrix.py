@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Callable
 from contextlib import nullcontext
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -26,7 +28,7 @@ from bms.model.pair import load_pair
 from bms.presets import DEFAULT_PRESET
 from bms.text_table import TextTable
 from bms.waiting import waiting
-from hil_sim.commands import options
+from hil_sim.commands import options, pack_options
 from hil_sim.fault_matrix.matrix import Row, load_matrix
 from hil_sim.fault_matrix.report import (
     MatrixResult,
@@ -37,7 +39,11 @@ from hil_sim.fault_matrix.report import (
     matrix_page,
 )
 from hil_sim.fault_matrix.runner import MatrixSettings, play_all
+from hil_sim.fault_matrix.verdict import Verdict
 from hil_sim.report.folder import OutputFolder
+
+Play = Callable[[int, Callable[[], None]], list[Verdict]]
+"""Plays rows by so many processes, and says after each that it is done."""
 
 
 def fault_matrix(
@@ -50,6 +56,7 @@ def fault_matrix(
         Path | None,
         typer.Option("--matrix", help="TOML file of rows. Default: the matrix of the project."),
     ] = None,
+    cells: pack_options.CellsOption = None,
     jobs: options.JobsOption = DEFAULT_PROCESSES,
     out: Annotated[
         Path | None,
@@ -60,19 +67,27 @@ def fault_matrix(
     """Play every row of the fault matrix and compare reaction, deadline and limits.
 
     Each row is a charge with one fault, on a bus with plant and firmware in this process. Deadlines
-    are in control periods from the fault's first one, which is number 1. Exit code 1 when a row
-    does not go as it says, or a limit of the plant is crossed.
+    are in control periods from the fault's first one, which is number 1. With --cells the rows are
+    those of a pack. Exit code 1 when a row does not go as it says, or a limit of the plant is
+    crossed.
 
     Example: bms fault-matrix --rows corrupted --out out/faults
     """
     settings = MatrixSettings(*load_pair(preset, model), bus, seed)
-    chosen = chosen_rows(load_matrix(matrix), rows)
+    play: Play
+    if cells is None:
+        chosen = chosen_rows(load_matrix(matrix), rows)
+        play = partial(play_all, settings, chosen)
+    else:
+        pack_options.refuse_options({"--matrix": matrix is not None})
+        chosen, play = _of_pack(settings, cells, rows)
     with OutputFolder(out) if out is not None else nullcontext() as folder:
         start_s = time.perf_counter()
         with waiting("playing faults", len(chosen), "rows") as wait:
-            verdicts = play_all(settings, chosen, jobs, wait.advance)
+            verdicts = play(jobs, wait.advance)
         result = MatrixResult(settings, verdicts, time.perf_counter() - start_s)
-        content = json.dumps(matrix_json(result), indent=2) + "\n"
+        size = {} if cells is None else {"cells": cells}
+        content = json.dumps(size | matrix_json(result), indent=2) + "\n"
         if folder is not None:
             folder.path("fault-matrix.json").write_text(content, encoding="utf-8")
             folder.path("junit.xml").write_text(matrix_junit(result), encoding="utf-8")
@@ -83,6 +98,22 @@ def fault_matrix(
     else:
         _print(Console(), result, out)
     return EXIT_CHECK_FAILED if result.red else EXIT_DONE
+
+
+def _of_pack(
+    settings: MatrixSettings, cells: int, rows: list[str] | None
+) -> tuple[list[Row], Play]:
+    """The rows of a pack that are asked for, and what plays them."""
+    from hil_sim.pack import fault_matrix as of_pack  # noqa: PLC0415 (plots and solvers)
+    from hil_sim.pack.settings import PackChargeSettings  # noqa: PLC0415
+
+    of_pack.require_rows_fit(cells)
+    pack = PackChargeSettings(
+        settings.preset, settings.model, cells, bus=settings.bus, seed=settings.seed
+    )
+    pack.core()  # what cannot be is said before a run
+    chosen = chosen_rows(of_pack.pack_rows(), rows)
+    return chosen, partial(of_pack.play_rows, pack, chosen)
 
 
 def chosen_rows(rows: tuple[Row, ...], patterns: list[str] | None) -> list[Row]:

@@ -13,6 +13,7 @@ from bms.text_table import TextTable
 from bms.waiting import waiting
 from hil_sim.pack.settings import PackChargeSettings, spread_of
 from hil_sim.pack.spread_kind import SpreadKind
+from hil_sim.pack.thermistor_map import thermistor_map
 from hil_sim.studies.pack.certificate import (
     FAMILY_PARTS,
     PARTS,
@@ -28,13 +29,20 @@ def verify_pack(
     cells: int,
     spread: SpreadKind,
     per_thermistor: int,
+    thermistors: Path | None,
     around: Surroundings,
     as_json: bool,
 ) -> int:
     """Certify a pack, print what was shown, and return the exit code."""
     chosen, estimator = load_pair(preset, model)
     settings = PackChargeSettings(
-        chosen, estimator, cells, spread=spread, per_thermistor=per_thermistor, around=around
+        chosen,
+        estimator,
+        cells,
+        spread=spread,
+        per_thermistor=per_thermistor,
+        around=around,
+        thermistor_at=thermistor_map(thermistors, cells, per_thermistor),
     )
     parts = PARTS if chosen.cell.interval is None else FAMILY_PARTS
     with waiting("verifying the pack", parts, "parts") as wait:

@@ -24,6 +24,7 @@ from hil_sim.pack.report import write_pack_report
 from hil_sim.pack.settings import PackChargeSettings
 from hil_sim.pack.spread_kind import SpreadKind
 from hil_sim.pack.summary import has_passed, summary
+from hil_sim.pack.thermistor_map import thermistor_map
 
 
 class Charge(Protocol):
@@ -46,6 +47,7 @@ def pack_settings(
     seed: int = 0,
     max_time_s: float = 3600.0,
     answer_timeout_s: float = 1.0,
+    thermistors: Path | None = None,
 ) -> PackChargeSettings:
     """What the options say. Raises InputError or ModelMismatchError."""
     chosen, estimator = load_pair(preset, model)
@@ -59,6 +61,7 @@ def pack_settings(
         per_thermistor=per_thermistor,
         max_time_s=max_time_s,
         answer_timeout_s=answer_timeout_s,
+        thermistor_at=thermistor_map(thermistors, cells, per_thermistor),
     )
     settings.core()  # what cannot be is said before a run
     return settings

@@ -6,6 +6,7 @@ What runs a pack is loaded only for one: a single cell's ECU starts without plot
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -23,6 +24,14 @@ SpreadOption = Annotated[
 PerThermistorOption = Annotated[
     int,
     typer.Option("--per-thermistor", min=1, help="Cells for each thermistor; with --cells."),
+]
+ThermistorsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--thermistors",
+        help="TOML file with the cell that each thermistor is at, in place of --per-thermistor: "
+        "[pack], thermistor_at = [3, 8, 14].",
+    ),
 ]
 NeighbourOption = Annotated[
     float,
@@ -64,10 +73,18 @@ def refuse_options(given: Mapping[str, bool]) -> None:
             raise InputError(f"{option}: is for one cell; leave it out, or --cells")
 
 
-def refuse_pack_options(spread: SpreadKind, per_thermistor: int) -> None:
+def refuse_pack_options(
+    spread: SpreadKind, per_thermistor: int, thermistors: Path | None = None
+) -> None:
     """Raise InputError for an option that means a pack, without --cells."""
     is_given = spread is not SpreadKind.PUBLISHED or per_thermistor != 1
     refuse_without_cells("--spread, --per-thermistor", is_given)
+    refuse_without_cells("--thermistors", thermistors is not None)
+
+
+def refuse_balancing(bleed_ohm: float, balance_s: float = 0.0) -> None:
+    """Raise InputError for balancing without --cells."""
+    refuse_without_cells("--bleed-ohm, --balance-s", bleed_ohm != 0.0 or balance_s != 0.0)
 
 
 def refuse_without_cells(options: str, is_given: bool) -> None:

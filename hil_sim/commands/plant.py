@@ -41,6 +41,9 @@ def plant(
     cells: pack_options.CellsOption = None,
     spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
     per_thermistor: pack_options.PerThermistorOption = 1,
+    thermistors: pack_options.ThermistorsOption = None,
+    bleed_ohm: pack_options.BleedOption = 0.0,
+    balance_s: pack_options.BalanceOption = 0.0,
     model: ModelOption = None,
 ) -> int:
     """Charge a simulated cell with whatever ECU is on the bus, for example `bms ecu`.
@@ -67,10 +70,21 @@ def plant(
             }
         )
         chosen = pack_charge.pack_settings(
-            preset, model, cells, bus, spread, per_thermistor, seed, max_time_s, answer_timeout_s
+            preset,
+            model,
+            cells,
+            bus,
+            spread,
+            per_thermistor,
+            seed,
+            max_time_s,
+            answer_timeout_s,
+            thermistors,
         )
+        chosen = replace(chosen, bleed_ohm=bleed_ohm, balance_s=balance_s)
         return pack_charge.plant_pack(chosen, out, as_json, log)
-    pack_options.refuse_pack_options(spread, per_thermistor)
+    pack_options.refuse_pack_options(spread, per_thermistor, thermistors)
+    pack_options.refuse_balancing(bleed_ohm, balance_s)
     if model is not None:
         raise InputError(f"--model {model}: is what a pack's ECU has to have; add --cells")
     settings = charge_settings(

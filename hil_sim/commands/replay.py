@@ -66,6 +66,7 @@ def replay(
     cells: pack_options.CellsOption = None,
     spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
     per_thermistor: pack_options.PerThermistorOption = 1,
+    thermistors: pack_options.ThermistorsOption = None,
 ) -> int:
     """Feed the frames of a log to the firmware in virtual time and compare its decisions.
 
@@ -83,10 +84,16 @@ def replay(
         from hil_sim.commands.pack_replay import replay_and_print  # noqa: PLC0415
 
         settings = pack_settings(
-            preset or DEFAULT_PRESET, model, cells, "virtual:bms", spread, per_thermistor
+            preset or DEFAULT_PRESET,
+            model,
+            cells,
+            "virtual:bms",
+            spread,
+            per_thermistor,
+            thermistors=thermistors,
         )
         return replay_and_print(log, settings, selection, as_json)
-    pack_options.refuse_pack_options(spread, per_thermistor)
+    pack_options.refuse_pack_options(spread, per_thermistor, thermistors)
     if against is not None:
         if out is not None:
             raise InputError("--out: there are two answers with --against; leave one of them out")

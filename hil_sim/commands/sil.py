@@ -54,6 +54,7 @@ def sil(
     cells: pack_options.CellsOption = None,
     spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
     per_thermistor: pack_options.PerThermistorOption = 1,
+    thermistors: pack_options.ThermistorsOption = None,
     bleed_ohm: pack_options.BleedOption = 0.0,
     balance_s: pack_options.BalanceOption = 0.0,
 ) -> int:
@@ -86,13 +87,20 @@ def sil(
             }
         )
         chosen = pack_charge.pack_settings(
-            preset, model, cells, bus, spread, per_thermistor, seed, max_time_s
+            preset,
+            model,
+            cells,
+            bus,
+            spread,
+            per_thermistor,
+            seed,
+            max_time_s,
+            thermistors=thermistors,
         )
         chosen = replace(chosen, bleed_ohm=bleed_ohm, balance_s=balance_s)
         return pack_charge.sil_pack(chosen, out, as_json, log)
-    pack_options.refuse_pack_options(spread, per_thermistor)
-    is_balancing = bleed_ohm != 0.0 or balance_s != 0.0
-    pack_options.refuse_without_cells("--bleed-ohm, --balance-s", is_balancing)
+    pack_options.refuse_pack_options(spread, per_thermistor, thermistors)
+    pack_options.refuse_balancing(bleed_ohm, balance_s)
     with ExitStack() as stack:
         if target is not None:
             if bus != Settings.bus:

@@ -22,6 +22,7 @@ def verify(
     cells: pack_options.CellsOption = None,
     spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
     per_thermistor: pack_options.PerThermistorOption = 1,
+    thermistors: pack_options.ThermistorsOption = None,
     neighbour_W_per_K: pack_options.NeighbourOption = Surroundings.neighbour_W_per_K,
     flow_W_per_K: pack_options.FlowOption = Surroundings.flow_W_per_K,
 ) -> int:
@@ -37,7 +38,7 @@ def verify(
     """
     around = Surroundings(neighbour_W_per_K, flow_W_per_K)
     if cells is None:
-        pack_options.refuse_pack_options(spread, per_thermistor)
+        pack_options.refuse_pack_options(spread, per_thermistor, thermistors)
         is_around = around != Surroundings()
         pack_options.refuse_without_cells("--neighbour-w-per-k, --flow-w-per-k", is_around)
         return verify_cell(preset, model, formulas, slips, boxes, as_json)
@@ -50,4 +51,4 @@ def verify(
             "--boxes": boxes != LARGEST_BOXES,
         }
     )
-    return verify_pack(preset, model, cells, spread, per_thermistor, around, as_json)
+    return verify_pack(preset, model, cells, spread, per_thermistor, thermistors, around, as_json)

@@ -57,7 +57,12 @@ class PackResult:
     active_faults: list[int] = field(default_factory=list)
     first_fault: int = int(FirstFault.NONE)
     faulty_cell: int = 0
+    latched: list[int] = field(default_factory=list)
+    """Bit n for fault n, as the ECU has said last, in each period since the start."""
     latched_faults: int = 0
+    """The same in the last period."""
+    state: int = int(CommandState.FAULT)
+    """What the ECU has said last."""
     edge: int | None = None
     """Period in which the charge was asked for."""
     full: int | None = None
@@ -165,6 +170,9 @@ class _Run:
         result.supplied_A.append(self._plant.current_A)
         result.active_faults.append(int(heard.active_faults))
         result.latched_faults = int(heard.latched_faults)
+        result.latched.append(result.latched_faults)
+        if is_said:
+            result.state = int(heard.state)
         if not math.isnan(heard.highest_soc):
             result.counted_soc = (float(heard.lowest_soc), float(heard.highest_soc))
         if heard.first_fault != FirstFault.NONE and result.first_fault == FirstFault.NONE:

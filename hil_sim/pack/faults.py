@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from hil_sim.bus.catalog import FirstFault
@@ -17,7 +17,10 @@ BEGIN_PERIOD = 150
 """Since the start, when the charge has its full current."""
 CELL = 4
 """The cell that faults are of, from 0 on; its page is that of 3 to 5."""
+LEAST_CELLS = 6
+"""That a pack with this page has."""
 VOLTAGE_ID, TEMPERATURE_ID, PLUG_IN_ID = 0x210, 0x220, 0x230
+COOLANT_ID, REQUEST_ID = 0x201, 0x202
 _PAGE = 1
 
 Reading = Callable[[PackPlant, int, dict[str, float]], None]
@@ -59,10 +62,7 @@ def run_fault(settings: PackChargeSettings, fault: PackFault, periods: int) -> P
         return [arrived for frame in frames for arrived in fault.delivery(frame, since)]
 
     limit_s = (BEGIN_PERIOD + periods) * settings.preset.timing.sampling_period_s
-    longer = PackChargeSettings(
-        settings.preset, settings.model, settings.cells, settings.bus, settings.spread,
-        settings.seed, settings.per_thermistor, limit_s,
-    )  # fmt: skip
+    longer = replace(settings, max_time_s=limit_s)
     return charge_pack(longer, tamper=tamper, sent=sent, ends_early=False)
 
 
@@ -105,12 +105,13 @@ def _as_another_page(frame: Frame, since: int) -> list[Frame]:
     return [Frame(frame.frame_id, bytes([frame.data[0], frame.data[1] & 0x0F, *frame.data[2:]]))]
 
 
-def _late(first_id: int) -> Delivery:
+def _late(first_id: int, is_paged: bool = True) -> Delivery:
     """A queue that has grown by a period: from then on each frame comes in the next one."""
     waiting: list[Frame] = []
 
     def deliver(frame: Frame, since: int) -> list[Frame]:
-        if not _is_page(frame, first_id):
+        is_it = _is_page(frame, first_id) if is_paged else frame.frame_id == first_id
+        if not is_it:
             return [frame]
         if since == 0:
             waiting.clear()
@@ -191,7 +192,7 @@ def _no_coolant(plant: PackPlant, since: int, kept: dict[str, float]) -> None:
 
 
 MISSING_V, MISSING_T = FirstFault.ELECTRICAL_MISSING, FirstFault.THERMAL_MISSING
-CORRUPTED = FirstFault.CORRUPTED_FRAMES
+CORRUPTED, DEVIATION = FirstFault.CORRUPTED_FRAMES, FirstFault.VOLTAGE_DEVIATION
 VOLTAGE, SURFACE = FirstFault.VOLTAGE_RANGE, FirstFault.SURFACE_RANGE
 FAULTS = (
     PackFault("voltage page missing", 0, (MISSING_V,), delivery=_missing(VOLTAGE_ID)),
@@ -206,6 +207,12 @@ FAULTS = (
     PackFault("temperature page frozen", 1, (MISSING_T,), delivery=_frozen(TEMPERATURE_ID)),
     PackFault("voltage page a period late", 0, (MISSING_V,), delivery=_late(VOLTAGE_ID)),
     PackFault("temperature page a period late", 0, (MISSING_T,), delivery=_late(TEMPERATURE_ID)),
+    PackFault(
+        "coolant a period late", 0, (FirstFault.COOLANT_MISSING,), delivery=_late(COOLANT_ID, False)
+    ),
+    PackFault(
+        "request a period late", 0, (FirstFault.REQUEST_MISSING,), delivery=_late(REQUEST_ID, False)
+    ),
     PackFault("voltage page too short", 0, (MISSING_V,), delivery=_short),
     PackFault("voltage page from two senders", 2, (CORRUPTED,), delivery=_twice),
     PackFault("page of cells that are not there", 2, (CORRUPTED,), delivery=_unknown_page),
@@ -213,7 +220,7 @@ FAULTS = (
     PackFault("a cell's voltage out of range", 0, (VOLTAGE,), reading=_set_voltage(6.0)),
     PackFault("a cell's voltage off by 0.3 V", 0, (VOLTAGE,), reading=_off_voltage),
     PackFault("the string's voltage off by 1 V", 0, (VOLTAGE,), reading=_off_string),
-    PackFault("a cell's voltage stuck", 600, (VOLTAGE,), reading=_stuck_voltage),
+    PackFault("a cell's voltage stuck", 600, (VOLTAGE, DEVIATION), reading=_stuck_voltage),
     PackFault("thermistor wire open", 0, (SURFACE,), reading=_set_surface(math.nan)),
     PackFault("thermistor reads its lowest", 0, (SURFACE,), reading=_set_surface(200.0)),
     PackFault("thermistor stuck", 600, (FirstFault.SURFACE_DEFICIT,), reading=_stuck_surface),

@@ -44,6 +44,8 @@ class PackChargeSettings:
     """Of the resistor across each cell; 0 for none."""
     balance_s: float = 0.0
     """For which a full pack stays plugged in."""
+    thermistor_at: tuple[int, ...] | None = None
+    """Cell of each thermistor, from 0 on; None for one in the middle of each `per_thermistor`."""
     around: Surroundings = field(default_factory=Surroundings)
 
     def __post_init__(self) -> None:
@@ -51,16 +53,28 @@ class PackChargeSettings:
         most = lib.BMS_MAX_FAMILY_CELLS if is_family else lib.BMS_MAX_CELLS
         if not 1 <= self.cells <= most:
             raise InputError(f"--cells {self.cells}: from 1 to {most} cells fit into a pack")
-        if is_family and self.per_thermistor != 1:
+        if is_family and not self.has_all_thermistors:
+            option = (
+                f"--per-thermistor {self.per_thermistor}"
+                if self.thermistor_at is None
+                else f"--thermistors: {len(self.thermistor_at)} of {self.cells} cells"
+            )
             raise InputError(
-                f"--per-thermistor {self.per_thermistor}: preset '{self.preset.name}' states a "
-                "family, each cell of which needs a thermistor; leave it out"
+                f"{option}: preset '{self.preset.name}' states a family, each cell of which needs "
+                "a thermistor; leave it out"
             )
 
     @property
     def view(self) -> View:
         """Which cells have a thermistor; all are seen."""
+        if self.thermistor_at is not None:
+            return View(tuple(range(self.cells)), self.thermistor_at)
         return all_cells(self.cells, self.per_thermistor)
+
+    @property
+    def has_all_thermistors(self) -> bool:
+        """Whether each cell has a thermistor."""
+        return len(self.view.thermistors) == self.cells
 
     def core(self) -> Core:
         """Constants of the control core, with what the spread needs in reserve.
@@ -77,7 +91,7 @@ class PackChargeSettings:
             spread_of(self.spread),
             self.around,
             self.model.error_bound_K,
-            all_seen=self.per_thermistor == 1,
+            all_seen=self.has_all_thermistors,
         )
 
     def balance(self) -> dict[str, float]:

@@ -33,6 +33,7 @@ def summary(result: PackResult) -> dict[str, Any]:
         "bus": settings.bus,
         "cells": settings.cells,
         "thermistors": len(settings.view.thermistors),
+        "thermistor_at": [cell + 1 for cell in settings.view.thermistors],
         "spread": settings.spread.value,
         "seed": settings.seed,
         "stop_reason": result.reason,

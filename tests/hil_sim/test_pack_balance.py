@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import shutil
 import subprocess
 import sys
@@ -14,7 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bms.model.model_file import shipped_model_path
 from bms.model.pair import load_pair
+from bms.presets import preset_path
 from hil_sim.pack.charge import charge_pack
 from hil_sim.pack.ecu import PackEcu
 from hil_sim.pack.plant import PackPlant, PackWire, obeyed_A
@@ -23,6 +26,7 @@ from hil_sim.pack.summary import margins
 from hil_sim.studies.pack._pack import lib
 
 ROOT = Path(__file__).parents[2]
+BMS = Path(sys.executable).with_name("bms")
 PRESET, MODEL = load_pair("paper_calibrated", None)
 NEARLY_FULL = replace(PRESET, initial=replace(PRESET.initial, soc=0.93))
 COMPLETE, BLEED_ID = 4, 0x2B0
@@ -280,9 +284,41 @@ def test_the_command_balances_and_says_the_spread_before_and_after(bms, tmp_path
     assert f"{said['spread_when_full']:.4f} when it was full" in page
 
 
-@pytest.mark.parametrize("option", ["--bleed-ohm", "--balance-s"])
-def test_balancing_one_cell_is_refused_in_one_line(bms, option):
-    code, out, err = bms("sil", option, 10)
+@pytest.mark.slow
+def test_plant_and_ecu_balance_as_two_processes_as_they_do_in_one(bms, tmp_path):
+    """Beside it the same plant with an ECU that was told of no resistors: nothing is bled."""
+    preset = tmp_path / "nearly_full.toml"
+    shipped = preset_path("paper_calibrated").read_text()
+    assert shipped.count("\nsoc = 0.0001\n") == 1
+    preset.write_text(shipped.replace("\nsoc = 0.0001\n", "\nsoc = 0.965\n"))
+    pack = ["--cells", 4, "--preset", preset, "--model", shipped_model_path("paper_calibrated")]
+    spreads = {}
+    for ohm in (5, 0):
+        bus = f"udp_multicast:239.74.165.{1 + (os.getpid() + ohm) % 250}"
+        options = [*pack, "--seed", 1, "--bleed-ohm", 5, "--balance-s", 40]
+        ecu = [BMS, "ecu", "--bus", bus, "--silence-s", "5", "--bleed-ohm", ohm, *pack]
+        with subprocess.Popen([*map(str, ecu)], stdout=subprocess.PIPE) as process:
+            code, out, err = bms(
+                "plant", "--bus", bus, "--answer-timeout-s", 20, *options, "--json"
+            )
+            assert code == 0, err
+            assert process.wait(30) == 0
+        spreads[ohm] = json.loads(out)["spread_at_end"]
+    code, out, _ = bms("sil", *options, "--json")
+    assert spreads[5] == json.loads(out)["spread_at_end"]
+    assert spreads[5] < spreads[0] - 3e-4
+
+
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        *(("sil", "--bleed-ohm"), ("sil", "--balance-s")),
+        *(("plant", "--bleed-ohm"), ("plant", "--balance-s"), ("ecu", "--bleed-ohm")),
+    ],
+)
+def test_balancing_one_cell_is_refused_in_one_line(bms, command, option):
+    bus = () if command == "sil" else ("--bus", "udp_multicast:239.74.165.251")
+    code, out, err = bms(command, *bus, option, 10)
     assert (code, out, len(err.splitlines())) == (2, "", 1)
     assert "add --cells" in err
 

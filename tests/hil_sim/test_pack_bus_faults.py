@@ -247,6 +247,10 @@ MUTANTS = {
         [LATE],
         ["voltage page a period late", "temperature page a period late"],
     ),
+    "phase of messages": (
+        [(NETWORK, "ecu->is_usable[i] = false;", "ecu->is_usable[i] = true;")],
+        ["coolant a period late", "request a period late"],
+    ),
     "number of cells": (
         [(NETWORK, "ecu->is_disturbed = true;\n        return true;", "return true;")],
         ["page of cells that are not there"],
@@ -257,11 +261,12 @@ MUTANTS = {
     ),
     "sum of voltages": (
         [SUM],
-        [
-            "a cell's voltage off by 0.3 V",
-            "the string's voltage off by 1 V",
-            "a cell's voltage stuck",
-        ],
+        ["a cell's voltage off by 0.3 V", "the string's voltage off by 1 V"],
+    ),
+    # Of many cells the sum leaves so much that the deviation is seen first.
+    "sum and deviation of voltages": (
+        [SUM, (SYMPTOMS, "pack->soc_known && voltage_deviates(pack, index, reading)", "false")],
+        ["a cell's voltage stuck"],
     ),
     # What the network refuses is told to the core, and overrides what the core decides.
     "stop by the network": (
