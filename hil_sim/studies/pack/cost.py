@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import struct
+import sys
 import tempfile
 import time
 from dataclasses import asdict, dataclass
@@ -151,8 +152,12 @@ def host_bytes(cells: int, has_family: bool) -> int:
 
 
 def main() -> None:
-    """Print the table, and the same as JSON."""
-    counted = instructions() if PROGRAM.is_file() else []
+    """Print the table, and the same as JSON; without the board's program it has no figures."""
+    try:
+        counted = instructions()
+    except InputError as error:
+        counted = []
+        print(f"not run: instructions of the Cortex-M4F: {error}", file=sys.stderr)
     table = TextTable(
         "cells", "host us", "M4F most", "M4F least", "RAM B", "RAM with family B",
         title="A control period of a pack",
@@ -171,9 +176,9 @@ def main() -> None:
         table.add_row(
             str(cells),
             f"{row['host_us']:.2f}",
-            f"{max((c.most for c in own), default=0)}",
-            f"{min((c.least for c in own), default=0)}",
-            f"{own[0].pack_bytes if own else row['bytes']}",
+            str(max(c.most for c in own)) if own else "–",
+            str(min(c.least for c in own)) if own else "–",
+            str(own[0].pack_bytes) if own else "–",
             f"{row['family_bytes']}",
         )
     table.print(Console())
