@@ -66,6 +66,7 @@ def cell_preset(
     parameters = _parameters(cell, rated, interval, full, given, notes)
     limits = _limits(rated, parameters, full, _voltage_sensor(interval), notes)
     uncertainty = _uncertainty(interval, notes)
+    box = _box(rated, parameters, limits, uncertainty, notes)
     preset = Preset(
         name=name,
         description=f"Identified from {len(cell.recordings)} recordings without a measured core",
@@ -76,8 +77,8 @@ def cell_preset(
         uncertainty=uncertainty,
         timing=Timing(0.1, 0.1),
         sensors=_sensors(limits, interval),
-        initial=_initial(rated, limits, parameters, notes),
-        operating_box=_box(rated, parameters, limits, uncertainty, notes),
+        initial=_initial(rated, limits, parameters, box, notes),
+        operating_box=box,
         plug_in=_plug_in(cell, parameters, notes),
         supply=Supply(_TOLERANCE, _LAG_S),
         current_map=_map(rated, notes),
@@ -306,7 +307,11 @@ def _heat_W(cell: CellParameters, limits: Limits) -> float:
 
 
 def _initial(
-    rated: RatedLimits, limits: Limits, cell: CellParameters, notes: dict[str, str]
+    rated: RatedLimits,
+    limits: Limits,
+    cell: CellParameters,
+    box: OperatingBox,
+    notes: dict[str, str],
 ) -> Initial:
     notes |= {
         "initial.soc": "chosen",
@@ -314,6 +319,7 @@ def _initial(
         "initial.cooling_power_W": "chosen: half of the heat at the strongest current",
     }
     room_K = min(max(298.15, rated.coldest_K + 5.0), rated.warmest_K - 5.0)
+    room_K = min(room_K, box.coolant_temperature_K[1])
     half_W = min(_figures(0.5 * _heat_W(cell, limits), 2), 0.5 * _MOST_COOLING_W)
     return Initial(0.1, round(room_K, 2), half_W)
 
