@@ -51,9 +51,8 @@ class _LazyCommand(TyperCommand):
 
     def make_context(self, *arguments: Any, **extra: Any) -> Any:
         """Context of the imported command, which then takes the place of this one."""
-        with left_out(
-            "asammdf"
-        ):  # python-can's own writer of MF4 would load it, with all of pandas
+        # python-can's own writer of MF4 would load it, with all of pandas.
+        with left_out("asammdf"):
             function = self._entry.load()
         subcommands = getattr(function, _SUBCOMMANDS, ())
         app = _typer(no_args_is_help=True) if subcommands else _typer()
