@@ -18,6 +18,7 @@ from hil_sim.bus.closing import Closing
 from hil_sim.bus.deadline import Deadline
 from hil_sim.bus.foreign import ForeignFrame, is_unreadable
 from hil_sim.bus.frame import Frame
+from hil_sim.bus.multicast import keep_to_own_group
 from hil_sim.bus.slcan import SCHEME, SlcanSocketBus
 
 __all__ = [
@@ -187,12 +188,15 @@ def open_interface(name: str, **options: Any) -> can.BusABC:
             return SlcanSocketBus(channel, **options)
         if interface in _BATCH_BUSES:
             return _BATCH_BUSES[interface](channel, **options)
-        return can.Bus(
+        bus = can.Bus(
             interface=interface,
             channel=channel,
             ignore_config=True,
             **{**_QUIRKS.get(interface, {}), **options},
         )
+        if interface == "udp_multicast":
+            keep_to_own_group(bus)
+        return bus
     except Exception as error:  # every adapter behind python-can has exceptions of its own
         raise BusError(
             f"bus '{name}': cannot be opened ({one_line(error)}); {_remedy(interface)}"

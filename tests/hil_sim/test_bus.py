@@ -1,5 +1,7 @@
 """Buses are opened by name and carry classical 11-bit data frames."""
 
+import contextlib
+
 import can
 import pytest
 from hypothesis import given
@@ -93,3 +95,20 @@ def test_a_virtual_bus_is_no_bus_for_two_processes():
     require_shared("socketcan:vcan0")
     with pytest.raises(InputError, match="bms sil"):
         require_shared("virtual:bms")
+
+
+@pytest.mark.parametrize(
+    ("group", "neighbour"),
+    [("239.74.166.1", "239.74.166.2"), ("ff15:7079:7468:6f6e::1", "ff15:7079:7468:6f6e::2")],
+)
+def test_a_multicast_bus_hears_its_own_group_alone(group, neighbour):
+    """Also where another program on the machine has joined the other one."""
+    with contextlib.ExitStack() as buses:
+        one, other, stranger = (
+            buses.enter_context(open_bus(f"udp_multicast:{name}"))
+            for name in (group, group, neighbour)
+        )
+        stranger.send(Frame(0x100, b"stranger"))
+        one.send(Frame(0x200, b"own"))
+        assert other.receive(1.0) == Frame(0x200, b"own")
+        assert other.receive(0.1) is None
