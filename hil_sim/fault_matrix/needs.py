@@ -25,13 +25,18 @@ def unmet(needs: tuple[Need, ...], preset: Preset, result: RunResult, onset: int
     return next((reason for reason in reasons if reason is not None), None)
 
 
-def _known_cell(preset: Preset, result: RunResult, onset: int) -> str | None:
+def unknown_cell(preset: Preset) -> str | None:
+    """Why a row that takes a known cell for granted does not apply; None where it is known."""
     if preset.cell.interval is None:
         return None
     return (
         "the preset is a family of cells, for which a fault is what no cell, sensor or supply of "
         "it could read; the current is safe for all of them"
     )
+
+
+def _known_cell(preset: Preset, result: RunResult, onset: int) -> str | None:
+    return unknown_cell(preset)
 
 
 def _temperature_limited(preset: Preset, result: RunResult, onset: int) -> str | None:

@@ -15,7 +15,15 @@ from hil_sim.fault_matrix.matrix import Expectation, Row, Start
 from hil_sim.fault_matrix.verdict import Verdict
 from hil_sim.faults.base import Fault
 from hil_sim.pack.charge import PackResult
-from hil_sim.pack.faults import BEGIN_PERIOD, FAULTS, LEAST_CELLS, PackFault, complaint, run_fault
+from hil_sim.pack.faults import (
+    BEGIN_PERIOD,
+    FAULTS,
+    LEAST_CELLS,
+    PackFault,
+    complaint,
+    is_charging,
+    run_fault,
+)
 from hil_sim.pack.settings import PackChargeSettings
 from hil_sim.pack.summary import KINDS, margins
 from hil_sim.run.workforce import local_workforce
@@ -76,6 +84,7 @@ def play_row(settings: PackChargeSettings, row: Row) -> Verdict:
     (fault,) = (one for one in FAULTS if one.name == row.name)
     result = run_fault(settings, fault, fault.stop_periods + AFTER_PERIODS)
     missed = complaint(result, fault)
+    reason = fault.excuse(settings) if missed is not None and is_charging(result) else None
     commands, latched = (each[BEGIN_PERIOD:] for each in (result.commands_A, result.latched))
     peaks = result.peaks.max(axis=0)
     return Verdict(
@@ -91,7 +100,8 @@ def play_row(settings: PackChargeSettings, row: Row) -> Verdict:
         max_surface_temperature_K=float(peaks[2]),
         max_voltage_V=float(peaks[3]),
         wall_time_s=result.wall_time_s,
-        failures=(*([] if missed is None else [missed]), *_crossed(result)),
+        failures=(*([] if missed is None or reason else [missed]), *_crossed(result)),
+        does_not_apply=reason,
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from hil_sim.bus.catalog import FirstFault
 from hil_sim.bus.frame import Frame
+from hil_sim.fault_matrix.needs import unknown_cell
 from hil_sim.pack.charge import PackResult, charge_pack
 from hil_sim.pack.plant import PackPlant
 from hil_sim.pack.settings import PackChargeSettings
@@ -21,6 +22,7 @@ LEAST_CELLS = 6
 """That a pack with this page has."""
 VOLTAGE_ID, TEMPERATURE_ID, PLUG_IN_ID = 0x210, 0x220, 0x230
 COOLANT_ID, REQUEST_ID = 0x201, 0x202
+CELL_OFFSET_V = 0.3
 _PAGE = 1
 
 Reading = Callable[[PackPlant, int, dict[str, float]], None]
@@ -28,13 +30,16 @@ Reading = Callable[[PackPlant, int, dict[str, float]], None]
 Delivery = Callable[[Frame, int], Iterable[Frame]]
 """What arrives in place of a frame."""
 
+Excuse = Callable[[PackChargeSettings], str | None]
+
 
 @dataclass(frozen=True)
 class PackFault:
     """A fault from BEGIN_PERIOD on.
 
     `stop_periods` is the deadline: after so many periods more every command is 0 A; 0 means the
-    very period. `names` are faults of which one has to stand in the end.
+    very period. `names` are faults of which one has to stand in the end. `excuse` says why a fault
+    cannot be told from what is right in a pack like this; None where it can.
     """
 
     name: str
@@ -42,6 +47,7 @@ class PackFault:
     names: tuple[FirstFault, ...]
     reading: Reading | None = None
     delivery: Delivery | None = None
+    excuse: Excuse = lambda settings: None
 
 
 def run_fault(settings: PackChargeSettings, fault: PackFault, periods: int) -> PackResult:
@@ -66,12 +72,17 @@ def run_fault(settings: PackChargeSettings, fault: PackFault, periods: int) -> P
     return charge_pack(longer, tamper=tamper, sent=sent, ends_early=False)
 
 
+def is_charging(result: PackResult) -> bool:
+    """Whether a current was asked for when the fault began."""
+    before_A = result.commands_A[BEGIN_PERIOD - 1]
+    return before_A is not None and before_A < 0.0
+
+
 def complaint(result: PackResult, fault: PackFault) -> str | None:
     """What is wrong with how the ECU met a fault; None where it kept its deadline."""
     commands = result.commands_A
-    before = commands[BEGIN_PERIOD - 1]
-    if before is None or before > -1.0:
-        return f"there was no charging current before the fault: {before}"
+    if not is_charging(result):
+        return f"there was no charging current before the fault: {commands[BEGIN_PERIOD - 1]}"
     for period in range(BEGIN_PERIOD + fault.stop_periods, len(commands)):
         if commands[period] != 0.0:
             return f"{commands[period]} A, {period - BEGIN_PERIOD} periods after it began"
@@ -152,6 +163,21 @@ def _short(frame: Frame, since: int) -> list[Frame]:
     return [Frame(frame.frame_id, frame.data[:-1])] if _is_page(frame, VOLTAGE_ID) else [frame]
 
 
+def _unknown_cell(settings: PackChargeSettings) -> str | None:
+    return unknown_cell(settings.preset)
+
+
+def _sum_is_loose(settings: PackChargeSettings) -> str | None:
+    known_V = settings.pack_voltage_error_V
+    if known_V < CELL_OFFSET_V:
+        return None
+    return (
+        f"the voltages of {settings.cells} cells, by the errors of this preset's sensors, may miss "
+        f"the string's by {known_V:.2f} V together; one that is off by {CELL_OFFSET_V:g} V may be "
+        "right"
+    )
+
+
 def _set_voltage(value_V: float) -> Reading:
     def change(plant: PackPlant, since: int, kept: dict[str, float]) -> None:
         plant.measured.voltage_V[CELL] = value_V
@@ -167,7 +193,7 @@ def _set_surface(value_K: float) -> Reading:
 
 
 def _off_voltage(plant: PackPlant, since: int, kept: dict[str, float]) -> None:
-    plant.measured.voltage_V[CELL] += 0.3
+    plant.measured.voltage_V[CELL] += CELL_OFFSET_V
 
 
 def _off_string(plant: PackPlant, since: int, kept: dict[str, float]) -> None:
@@ -218,12 +244,30 @@ FAULTS = (
     PackFault("page of cells that are not there", 2, (CORRUPTED,), delivery=_unknown_page),
     PackFault("a cell's voltage not a number", 0, (VOLTAGE,), reading=_set_voltage(math.nan)),
     PackFault("a cell's voltage out of range", 0, (VOLTAGE,), reading=_set_voltage(6.0)),
-    PackFault("a cell's voltage off by 0.3 V", 0, (VOLTAGE,), reading=_off_voltage),
+    PackFault(
+        "a cell's voltage off by 0.3 V",
+        0,
+        (VOLTAGE,),
+        reading=_off_voltage,
+        excuse=_sum_is_loose,
+    ),
     PackFault("the string's voltage off by 1 V", 0, (VOLTAGE,), reading=_off_string),
-    PackFault("a cell's voltage stuck", 600, (VOLTAGE, DEVIATION), reading=_stuck_voltage),
+    PackFault(
+        "a cell's voltage stuck",
+        600,
+        (VOLTAGE, DEVIATION),
+        reading=_stuck_voltage,
+        excuse=_unknown_cell,
+    ),
     PackFault("thermistor wire open", 0, (SURFACE,), reading=_set_surface(math.nan)),
     PackFault("thermistor reads its lowest", 0, (SURFACE,), reading=_set_surface(200.0)),
-    PackFault("thermistor stuck", 600, (FirstFault.SURFACE_DEFICIT,), reading=_stuck_surface),
+    PackFault(
+        "thermistor stuck",
+        600,
+        (FirstFault.SURFACE_DEFICIT,),
+        reading=_stuck_surface,
+        excuse=_unknown_cell,
+    ),
     PackFault("no current reading", 0, (FirstFault.CURRENT_RANGE,), reading=_no_current),
     PackFault("no coolant reading", 0, (FirstFault.COOLANT_RANGE,), reading=_no_coolant),
 )

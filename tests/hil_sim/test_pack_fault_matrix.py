@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
@@ -11,7 +12,7 @@ from bms.model.pair import load_pair
 from hil_sim.bus.catalog import FirstFault
 from hil_sim.commands.fault_matrix import fault_matrix
 from hil_sim.pack import fault_matrix as of_pack
-from hil_sim.pack.faults import FAULTS, PackFault
+from hil_sim.pack.faults import CELL_OFFSET_V, FAULTS, PackFault
 from hil_sim.pack.settings import PackChargeSettings
 
 SETTINGS = PackChargeSettings(*load_pair("paper_calibrated", None), 6)
@@ -70,6 +71,43 @@ def test_a_fault_that_is_not_met_and_a_limit_that_is_crossed_are_red(
     assert fault_matrix(cells=6, jobs=1) == 1
     told = " ".join(capsys.readouterr().out.split())
     assert said in told and "1 of 1 rows are red" in told
+
+
+FAMILY = ("samsung_30q", 16, "thermistor stuck", "a family of cells")
+LOOSE = ("samsung_30q", 96, "a cell's voltage off by 0.3 V", "may miss the string's by 0.")
+
+
+@pytest.mark.parametrize(("preset", "cells", "name", "said"), [FAMILY, LOOSE])
+def test_a_fault_that_the_preset_cannot_tell_from_what_is_right_does_not_apply(
+    monkeypatch, preset, cells, name, said
+):
+    """That no limit is crossed is asked all the same; without its excuse the same run is red."""
+    settings = PackChargeSettings(*load_pair(preset, None), cells)
+    (row,) = (row for row in of_pack.pack_rows() if row.name == name)
+    verdict = of_pack.play_row(settings, row)
+    assert verdict.failures == ()
+    assert said in verdict.does_not_apply
+    (fault,) = (fault for fault in FAULTS if fault.name == name)
+    monkeypatch.setattr(of_pack, "FAULTS", (replace(fault, excuse=lambda settings: None),))
+    verdict = of_pack.play_row(settings, row)
+    assert verdict.does_not_apply is None
+    assert "periods after it began" in verdict.failures[0]
+
+
+def test_no_row_of_the_default_preset_needs_an_excuse():
+    settings = PackChargeSettings(*load_pair("paper_calibrated", None), 96)
+    assert [fault.name for fault in FAULTS if fault.excuse(settings)] == []
+
+
+@pytest.mark.parametrize("off_V", [-0.01, 0.01])
+def test_the_sum_of_the_cells_tells_a_wrong_one_by_more_than_all_errors_together(off_V):
+    """From both sides: so many cells that the errors are just below, and just above the offset."""
+    preset, model = load_pair("samsung_30q", None)
+    (fault,) = (fault for fault in FAULTS if fault.name == "a cell's voltage off by 0.3 V")
+    known_V = [PackChargeSettings(preset, model, n).pack_voltage_error_V for n in range(1, 193)]
+    cells = next(n for n, error_V in enumerate(known_V, 1) if error_V >= CELL_OFFSET_V)
+    settings = PackChargeSettings(preset, model, cells if off_V > 0.0 else cells - 1)
+    assert (fault.excuse(settings) is not None) == (off_V > 0.0)
 
 
 @pytest.mark.parametrize(
