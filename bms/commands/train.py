@@ -46,9 +46,14 @@ def train(
     ] = None,
     grid: Annotated[int, typer.Option("--grid", help="Grid intervals G.")] = DEFAULTS.grid,
     degree: Annotated[int, typer.Option("--degree", help="Spline degree k.")] = DEFAULTS.degree,
-    epochs: Annotated[int, typer.Option("--epochs", help="Penalised epochs.")] = DEFAULTS.epochs,
+    epochs: Annotated[
+        int, typer.Option("--epochs", help="Penalised epochs, of widths other than n,1,1.")
+    ] = DEFAULTS.epochs,
     refinement_steps: Annotated[
-        int, typer.Option("--refinement-steps", help="L-BFGS steps without penalties afterwards.")
+        int,
+        typer.Option(
+            "--refinement-steps", help="L-BFGS steps without penalties afterwards, at most."
+        ),
     ] = DEFAULTS.refinement_steps,
 ) -> None:
     """Train the estimator of the core temperature (K) and write it with its errors.
@@ -57,8 +62,8 @@ def train(
     profiles; with --data they are measurements, the first two thirds of them for training.
 
     A lagged model also sees what has been: low-pass filtered current squared, and how far the
-    surface temperature is above its own filtered value. With --data the width n,1,1 is fitted in
-    closed form, as smooth as stretches left out allow; epochs and steps are for other widths.
+    surface temperature is above its own filtered value. The width n,1,1 is fitted in closed form,
+    with --data as smooth as stretches left out allow; epochs are for other widths.
 
     Example: bms train --preset paper_calibrated --out model.json
     """

@@ -20,9 +20,10 @@ PRESET_LAGS_S = (3.0,)
 class TrainingSettings:
     """Shape of the network and hyper-parameters; the defaults are the paper's table.
 
-    `refinement_steps` L-BFGS steps without penalties follow the epochs; the paper has none. Every
-    time constant adds two lagged inputs, of the current squared and of the surface temperature.
-    Raises InputError for a width that does not end in one output.
+    Where there is one hidden node an additive fit stands in place of the epochs. At most
+    `refinement_steps` L-BFGS steps without penalties follow; the paper has none. Every time
+    constant adds two lagged inputs, of the current squared and of the surface temperature. Raises
+    InputError for a width that does not end in one output.
     """
 
     width: Annotated[tuple[Count, ...], MinLen(2)] = (4, 1, 1)

@@ -1,4 +1,4 @@
-"""Training: the paper's penalised epochs or an additive fit, then steps without penalties."""
+"""Training: an additive fit or the paper's penalised epochs, then steps without penalties."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ _STEPS_PER_ROUND = 20
 _PROBES = 2**14
 _INITIAL_NOISE = 0.1
 _START_ROUGHNESS = 1e-9
+_LEAST_GAIN = 1e-3
+"""Share of the mean square that a round of steps has to take away for another one to follow."""
 _NO_PENALTY = Penalty(0.0, 0.0, 0.0)
 
 
@@ -36,34 +38,35 @@ def train_network(
 ) -> Network:
     """Network fitted to samples whose inputs lie within `ranges`, (low, high) for each input.
 
-    Two starts: the paper's penalised epochs and, with one hidden node, the additive fit. Each is
-    refined on all samples without penalties, which would leave a bias of some hundredths of a
-    kelvin. Of all the networks on the way the one with the smallest validation error is kept.
-    `progress` gets the share done, 0..1. Raises InputError when the width does not fit the inputs.
+    It starts from the additive fit where there is one hidden node, else from the paper's penalised
+    epochs, and is refined on all samples without penalties, which would leave a bias of some
+    hundredths of a kelvin. Of all the networks on the way the one with the smallest validation
+    error is kept. `progress` gets the share done, 0..1. Raises InputError when the width does not
+    fit the inputs.
     """
     scaling = Scaling.of(training, ranges, settings)
     x, target = scaling.normalised(training)
     held_out = scaling.normalised(validation)
     rng = np.random.default_rng(settings.seed)
-    starts = [_penalised_epochs(x, target, settings, rng, part(progress, 0.0, 0.6))]
     if settings.has_one_hidden_node:
-        starts.append(additive_layers(x, target, settings, 1.0, _START_ROUGHNESS))
-    candidates = []
-    for number, start in enumerate(starts):
-        candidates += _refined(x, target, start, settings.refinement_steps, rng)
-        progress(0.6 + 0.4 * (number + 1) / len(starts))
+        start, share = additive_layers(x, target, settings, 1.0, _START_ROUGHNESS), 0.1
+    else:
+        start, share = penalised_epochs(x, target, settings, rng, part(progress, 0.0, 0.6)), 0.6
+    candidates = refined(
+        x, target, start, settings.refinement_steps, rng, part(progress, share, 1.0)
+    )
     best = min(candidates, key=lambda layers: mean_square(layers, *held_out))
     return scaling.network(best, settings, 1.0, domain_of(x.T))
 
 
-def _penalised_epochs(
+def penalised_epochs(
     x: Array,
     target: Array,
     settings: TrainingSettings,
     rng: np.random.Generator,
-    progress: Progress,
+    progress: Progress = to_nobody,
 ) -> list[TrainableLayer]:
-    """The paper's training: each epoch takes a few L-BFGS steps on a new batch.
+    """The paper's training on normalised samples x (in, N): L-BFGS steps on a batch an epoch.
 
     Until the epoch of `grid_update_stop` the grids follow the data.
     """
@@ -80,17 +83,32 @@ def _penalised_epochs(
     return layers
 
 
-def _refined(
-    x: Array, target: Array, start: list[TrainableLayer], steps: int, rng: np.random.Generator
+def refined(
+    x: Array,
+    target: Array,
+    start: list[TrainableLayer],
+    steps: int,
+    rng: np.random.Generator,
+    progress: Progress = to_nobody,
 ) -> list[list[TrainableLayer]]:
-    """Networks after no and each further round of steps on all samples without penalties."""
+    """Networks after no and each further round of steps on all samples without penalties.
+
+    Samples are normalised, x (in, N). The rounds end early where one brings nothing.
+    """
     candidates = [solve_last_layer(follow_data(start, x), x, target)]
-    for _ in range(-(-steps // _STEPS_PER_ROUND)):
+    left = mean_square(candidates[0], x, target)
+    rounds = -(-steps // _STEPS_PER_ROUND)
+    for number in range(rounds):
+        progress(number / rounds)
         layers = candidates[-1]
         probes = x[:, rng.permutation(len(target))[:_PROBES]]
         loss = Loss(layers, x, target, _NO_PENALTY)
         layers = descend(layers, loss, _STEPS_PER_ROUND, gauss_newton_directions(layers, probes))
         candidates.append(solve_last_layer(follow_data(layers, x), x, target))
+        before, left = left, mean_square(candidates[-1], x, target)
+        if left > (1.0 - _LEAST_GAIN) * before:
+            break
+    progress(1.0)
     return candidates
 
 

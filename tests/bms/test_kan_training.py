@@ -1,18 +1,21 @@
 """Training is reproducible, learns, and reports errors that an independent evaluation finds."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from bms.bounds.readings import measurement_error_K
 from bms.bus_signals import BusQuantisation
-from bms.data.datasets import simulated_split
+from bms.data.datasets import PROFILES_OF_EACH_KIND, simulated_split, simulated_splits
 from bms.data.simulate import Samples, joined
 from bms.errors import InputError
 from bms.kan.accuracy import error_figures
+from bms.kan.additive import additive_layers
+from bms.kan.scaling import Scaling
 from bms.kan.settings import TrainingSettings
-from bms.kan.training import train_network
+from bms.kan.training import mean_square, penalised_epochs, refined, train_network
 from bms.model.make import model_for_measurements, model_for_preset
 from bms.model.model_file import load_shipped_model
 from bms.presets import load_preset, one_cell_preset_names
@@ -169,3 +172,65 @@ def test_figures_of_known_errors():
     assert figures.rmse_K == pytest.approx(math.sqrt(5.0 / 3.0))
     assert (figures.max_abs_error_K, figures.samples) == (2.0, 3)
     assert figures.bias_K == pytest.approx(-1.0 / 3.0)
+
+
+def test_one_hidden_node_is_fitted_without_epochs():
+    """The additive fit stands in their place; any other width needs them."""
+    data = samples_of(random_network())
+    for width, is_same in (((4, 1, 1), True), ((4, 2, 1), False)):
+        few, more = (replace(SHORT, width=width, epochs=epochs) for epochs in (1, 3))
+        networks = [train_network(data, data, BOX, settings) for settings in (few, more)]
+        assert (networks[0] == networks[1]) == is_same
+
+
+def normalised(preset_name, settings, counts=PROFILES_OF_EACH_KIND):
+    """Training and validation samples of a preset, and how networks see them."""
+    preset = load_preset(preset_name)
+    wanted = {split: counts[split] for split in ("training", "validation")}
+    kinds = simulated_splits(preset, wanted, settings.seed, settings.lags)
+    splits = [joined(kinds[split].values()) for split in wanted]
+    scaling = Scaling.of(splits[0], preset.operating_box.ranges(), settings)
+    return [scaling.normalised(samples) for samples in splits]
+
+
+def test_rounds_of_refinement_go_on_as_long_as_they_help():
+    """To the end after the paper's epochs, not so after the additive fit."""
+    settings = replace(SHORT, epochs=1)
+    (x, target), _ = normalised("lin2014", settings, FEW)
+    rng = np.random.default_rng(0)
+
+    after_epochs, after_fit = (
+        refined(x, target, start, 80, rng)
+        for start in (
+            penalised_epochs(x, target, settings, rng),
+            additive_layers(x, target, settings, 1.0, 1e-9),
+        )
+    )
+
+    assert len(after_epochs) == 1 + 4
+    assert len(after_fit) < 1 + 4
+    errors = [mean_square(layers, x, target) for layers in after_fit]
+    left = [after / before for before, after in zip(errors, errors[1:])]
+    assert all(share <= 0.999 for share in left[:-1])
+    assert left[-1] > 0.999
+
+
+@pytest.mark.long("training")
+@pytest.mark.parametrize("preset_name", one_cell_preset_names())
+def test_the_papers_epochs_reach_no_smaller_error_than_the_additive_fit(preset_name):
+    """Why a network with one hidden node does not take them."""
+    settings = TrainingSettings()
+    (x, target), held_out = normalised(preset_name, settings)
+    rng = np.random.default_rng(settings.seed)
+    starts = (
+        additive_layers(x, target, settings, 1.0, 1e-9),
+        penalised_epochs(x, target, settings, rng),
+    )
+    additive, paper = (
+        min(
+            mean_square(layers, *held_out)
+            for layers in refined(x, target, start, settings.refinement_steps, rng)
+        )
+        for start in starts
+    )
+    assert additive <= paper
