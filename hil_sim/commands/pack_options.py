@@ -78,7 +78,8 @@ def refuse_options(given: Mapping[str, bool]) -> None:
     """Raise InputError for the first option that is given and means one cell only."""
     for option, is_given in given.items():
         if is_given:
-            raise InputError(f"{option}: is for one cell; leave it out, or --cells")
+            instead = ", or give --cell-plant" if option == "--plant" else ""
+            raise InputError(f"{option}: is for one cell; leave it out, or --cells{instead}")
 
 
 def refuse_pack_options(
