@@ -100,20 +100,25 @@ def test_the_same_cell_gives_the_same_frames_in_a_charge_that_ends_in_balancing(
     settings = pack_of(PAPER, soc=0.93, seed=1, bleed_ohm=10.0, balance_s=60.0)
     runs = []
     for plants in ((), ((1, "two-mass"), (2, "two-mass"))):
-        sent, read = [], []
+        sent, read, true = [], [], []
 
         def keep(frames, sent=sent):
             sent.append(frames)
             return frames
 
+        def note(plant, read=read, true=true):
+            read.append(readings(plant, 4))
+            true.append(truths(plant, 4))
+
         result = charge_pack(
             replace(settings, cell_plants=plants),
-            tamper=lambda plant, read=read: read.append(readings(plant, 4)),
+            tamper=note,
             sent=keep,
         )
         assert result.reason == "complete"
-        runs.append((sent, np.array(read), result))
-    (own_sent, own_read, own), (sent, read, foreign) = runs
+        runs.append((sent, np.array(read), np.array(true), result))
+    (own_sent, own_read, own_true, own), (sent, read, true, foreign) = runs
+    assert np.abs(true - own_true).max() < 5 * SAME_K, "most where the coolant begins to flow"
     others = [period for period, frames in enumerate(own_sent) if sent[period] != frames]
     assert len(own_sent) == len(sent) > 800 and len(others) <= 3
     surface_K = settings.preset.sensors.surface_temperature_K.resolution
