@@ -146,6 +146,10 @@ def _print(result: PackResult) -> None:
         )
     console = Console()
     table.print(console)
+    for cell, plant in content["cell_plants"].items():
+        console.print(f"cell {cell} is {plant}", highlight=False, markup=False)
+    if content["min_anode_potential_V"] is not None:
+        console.print(f"least anode potential {content['min_anode_potential_V']:.4f} V")
     fault = f"; first fault {content['first_fault']}" if content["first_fault"] else ""
     console.print(
         f"{content['cells_over']} cells over a limit{fault}; {content['frames_per_period']:.1f} "

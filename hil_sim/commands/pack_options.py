@@ -50,6 +50,14 @@ FlowOption = Annotated[
     ),
 ]
 
+CellPlantOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--cell-plant",
+        help="One cell of a pack, from 1 on, as another plant: CELL=PLANT with what --plant takes, "
+        "such as 3=pybamm; fmu excepted. May be repeated; with --cells.",
+    ),
+]
 BleedOption = Annotated[
     float,
     typer.Option(
@@ -70,16 +78,21 @@ def refuse_options(given: Mapping[str, bool]) -> None:
     """Raise InputError for the first option that is given and means one cell only."""
     for option, is_given in given.items():
         if is_given:
-            raise InputError(f"{option}: is for one cell; leave it out, or --cells")
+            instead = ", or give --cell-plant" if option == "--plant" else ""
+            raise InputError(f"{option}: is for one cell; leave it out, or --cells{instead}")
 
 
 def refuse_pack_options(
-    spread: SpreadKind, per_thermistor: int, thermistors: Path | None = None
+    spread: SpreadKind,
+    per_thermistor: int,
+    thermistors: Path | None = None,
+    cell_plant: list[str] | None = None,
 ) -> None:
     """Raise InputError for an option that means a pack, without --cells."""
     is_given = spread is not SpreadKind.PUBLISHED or per_thermistor != 1
     refuse_without_cells("--spread, --per-thermistor", is_given)
     refuse_without_cells("--thermistors", thermistors is not None)
+    refuse_without_cells("--cell-plant", bool(cell_plant))
 
 
 def refuse_balancing(bleed_ohm: float, balance_s: float = 0.0) -> None:

@@ -12,6 +12,7 @@ from bms.errors import InputError
 from bms.presets import DEFAULT_PRESET, load_preset
 from hil_sim.commands import charge_mode, options, pack_options
 from hil_sim.commands.outcome import charge_and_report, charge_settings
+from hil_sim.pack.cell_plants import cell_plants
 from hil_sim.pack.spread_kind import SpreadKind
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.session import run_plant
@@ -42,6 +43,7 @@ def plant(
     spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
     per_thermistor: pack_options.PerThermistorOption = 1,
     thermistors: pack_options.ThermistorsOption = None,
+    cell_plant: pack_options.CellPlantOption = None,
     bleed_ohm: pack_options.BleedOption = 0.0,
     balance_s: pack_options.BalanceOption = 0.0,
     model: ModelOption = None,
@@ -81,9 +83,14 @@ def plant(
             answer_timeout_s,
             thermistors,
         )
-        chosen = replace(chosen, bleed_ohm=bleed_ohm, balance_s=balance_s)
+        chosen = replace(
+            chosen,
+            bleed_ohm=bleed_ohm,
+            balance_s=balance_s,
+            cell_plants=cell_plants(cell_plant or [], cells),
+        )
         return pack_charge.plant_pack(chosen, out, as_json, log)
-    pack_options.refuse_pack_options(spread, per_thermistor, thermistors)
+    pack_options.refuse_pack_options(spread, per_thermistor, thermistors, cell_plant)
     pack_options.refuse_balancing(bleed_ohm, balance_s)
     if model is not None:
         raise InputError(f"--model {model}: is what a pack's ECU has to have; add --cells")

@@ -16,6 +16,7 @@ from hil_sim.bus.buses import is_serial_line
 from hil_sim.commands import charge_mode, options, pack_options
 from hil_sim.commands.baselines import BaselineOption, baseline_settings
 from hil_sim.commands.outcome import charge_and_report, charge_settings
+from hil_sim.pack.cell_plants import cell_plants
 from hil_sim.pack.spread_kind import SpreadKind
 from hil_sim.plant.disturbances import DisturbanceKind
 from hil_sim.run.session import run_sil
@@ -55,6 +56,7 @@ def sil(
     spread: pack_options.SpreadOption = SpreadKind.PUBLISHED,
     per_thermistor: pack_options.PerThermistorOption = 1,
     thermistors: pack_options.ThermistorsOption = None,
+    cell_plant: pack_options.CellPlantOption = None,
     bleed_ohm: pack_options.BleedOption = 0.0,
     balance_s: pack_options.BalanceOption = 0.0,
 ) -> int:
@@ -97,9 +99,14 @@ def sil(
             max_time_s,
             thermistors=thermistors,
         )
-        chosen = replace(chosen, bleed_ohm=bleed_ohm, balance_s=balance_s)
+        chosen = replace(
+            chosen,
+            bleed_ohm=bleed_ohm,
+            balance_s=balance_s,
+            cell_plants=cell_plants(cell_plant or [], cells),
+        )
         return pack_charge.sil_pack(chosen, out, as_json, log)
-    pack_options.refuse_pack_options(spread, per_thermistor, thermistors)
+    pack_options.refuse_pack_options(spread, per_thermistor, thermistors, cell_plant)
     pack_options.refuse_balancing(bleed_ohm, balance_s)
     with ExitStack() as stack:
         if target is not None:

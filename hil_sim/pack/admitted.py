@@ -16,7 +16,10 @@ _HALVINGS = 12
 
 
 class Ahead:
-    """Looks ahead from where a plant is; the plant itself stays as it is."""
+    """Looks ahead from where a plant is; the plant itself stays as it is.
+
+    Of foreign cells it sees the stand-ins.
+    """
 
     def __init__(self, settings: PackChargeSettings, plant: PackPlant, time_s: float) -> None:
         self._plant = plant

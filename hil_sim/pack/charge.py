@@ -69,6 +69,7 @@ class PackResult:
     """Period in which the pack became full."""
     full_socs: list[float] = field(default_factory=list)
     peaks: Any = None
+    least_anode_V: float | None = None
     final_socs: list[float] = field(default_factory=list)
     counted_soc: tuple[float, float] | None = None
     """What the ECU counted last of the emptiest and the fullest cell."""
@@ -160,6 +161,7 @@ class _Run:
                 plant.hold(obeyed_A(heard))
         result.wall_time_s = time.perf_counter() - start_s
         result.peaks, result.final_socs = plant.peaks(), plant.socs()
+        result.least_anode_V = plant.least_anode_V()
         return result
 
     def _note(self, heard: Any) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hil_sim.bus.frame import Frame
+from hil_sim.pack.foreign_cells import ForeignCells
 from hil_sim.pack.frames import FRAME, packed, unpacked
 from hil_sim.pack.settings import PackChargeSettings, spread_of
 from hil_sim.plant.charger import Charger
@@ -25,6 +26,7 @@ class PackPlant:
     """Draws the cells and the noise as `bms pack` does for its pack 0 of the same seed."""
 
     def __init__(self, settings: PackChargeSettings) -> None:
+        """Raises InputError as ForeignCells, whose cells are the settings' `cell_plants`."""
         preset = settings.preset
         children = np.random.SeedSequence(entropy=settings.seed, spawn_key=(0,)).spawn(4)
         draws, self._noise, _, string = (
@@ -41,6 +43,7 @@ class PackPlant:
         self.fields: Any = self._charge.fields
         """The C structure with cells, sensors and current."""
         self.fields.plant.bleed_ohm = settings.bleed_ohm
+        self._foreign = ForeignCells(preset, drawn, settings.cell_plants, self.fields)
         self.charger = Charger(preset)
         self.measured: Any = ffi.new("pack_measured_t *")
         """What the sensors read last."""
@@ -62,9 +65,14 @@ class PackPlant:
         normals = ffi.from_buffer("double[]", self._block[self._row])
         self._row += 1
         lib.pack_charge_measure(self.fields, normals, self.measured)
-        plant = ffi.addressof(self.fields, "plant")
-        current_A = self.fields.current_A
-        truth_V = sum(lib.plant_voltage_V(plant, i, current_A) for i in range(self._settings.cells))
+        for cell in self._foreign.plants:
+            self.measured.voltage_V[cell] = lib.pack_sensor_reading(
+                ffi.addressof(self.fields, "voltage"),
+                self.voltage_V(cell),
+                normals[2 * cell],
+                self.fields.noise_cutoff,
+            )
+        truth_V = sum(map(self.voltage_V, range(self._settings.cells)))
         self.pack_voltage_V = lib.pack_sensor_reading(
             self._string_sensor, truth_V, self._string_noise.standard_normal(), self._string_cutoff
         )
@@ -72,7 +80,10 @@ class PackPlant:
     def hold(self, command_A: float | None) -> None:
         """Supply what may be supplied for a command, None without one, for a control period."""
         self.fields.current_A = self.charger.current_A(command_A)
-        lib.plant_hold(ffi.addressof(self.fields, "plant"), self.fields.current_A, SUB_STEPS)
+        if self._foreign.plants:
+            self._foreign.hold(self.fields.current_A)
+        else:
+            lib.plant_hold(ffi.addressof(self.fields, "plant"), self.fields.current_A, SUB_STEPS)
 
     def bleed(self, heard: Any) -> None:
         """Switch the bleed resistors as PackWire.hear has it."""
@@ -82,6 +93,13 @@ class PackPlant:
     def current_A(self) -> float:
         """Current that flows, negative while charging."""
         return float(self.fields.current_A)
+
+    def voltage_V(self, cell: int) -> float:
+        """True voltage of a cell in V with the present current."""
+        if cell in self._foreign.plants:
+            return self._foreign.voltage_V(cell)
+        plant = ffi.addressof(self.fields, "plant")
+        return float(lib.plant_voltage_V(plant, cell, self.fields.current_A))
 
     def core_K(self) -> list[float]:
         """True core temperature of each cell in K."""
@@ -95,7 +113,21 @@ class PackPlant:
 
     def peaks(self) -> Any:
         """Greatest state of charge, core and surface temperature and voltage of each cell."""
-        return self._charge.peaks()
+        peaks = self._charge.peaks()
+        for cell, one in self._foreign.plants.items():
+            most = one.extremes
+            peaks[cell] = (
+                most.soc,
+                most.core_temperature_K,
+                most.surface_temperature_K,
+                most.voltage_V,
+            )
+        return peaks
+
+    def least_anode_V(self) -> float | None:
+        """Least anode potential of any cell that has electrodes, in V; None without one."""
+        least = [one.extremes.min_anode_potential_V for one in self._foreign.plants.values()]
+        return min((value for value in least if value is not None), default=None)
 
 
 class PackWire:

@@ -10,6 +10,7 @@ from bms.errors import InputError
 from bms.model.model_file import KanModel
 from bms.presets import Preset
 from bms.presets.schema import Sensor
+from hil_sim.pack.cell_plants import CellPlants
 from hil_sim.pack.spread_kind import SpreadKind
 from hil_sim.studies.pack._pack import lib
 from hil_sim.studies.pack.engine import Core, View, all_cells
@@ -47,6 +48,8 @@ class PackChargeSettings:
     thermistor_at: tuple[int, ...] | None = None
     """Cell of each thermistor, from 0 on; None for one in the middle of each `per_thermistor`."""
     around: Surroundings = field(default_factory=Surroundings)
+    cell_plants: CellPlants = ()
+    """Cells that are another plant than the pack's own."""
 
     def __post_init__(self) -> None:
         is_family = self.preset.cell.interval is not None
