@@ -366,3 +366,12 @@ def test_summary_page_and_text_name_the_plants(bms, tmp_path):
     assert said["min_anode_potential_V"] is None
     assert [row["cell"] for row in said["worst_margins"]] == [1, 2, 3]
     assert "cell 2 is two-mass" in (tmp_path / "out" / "report.html").read_text()
+
+
+@pytest.mark.parametrize(("over", "is_over"), [(0.005, False), (0.0051, True)])
+def test_a_cell_of_a_family_is_overfilled_where_a_campaign_says_so(over, is_over):
+    """It is full by its voltage, so that its true state of charge may be a little over 1."""
+    preset, model = load_pair("a123_26650_10C", None)
+    result = charge_pack(PackChargeSettings(preset, model, 2, max_time_s=1.0))
+    result.peaks[0, 0] = 1.0 + over
+    assert (margins(result) < 0.0).any() == is_over

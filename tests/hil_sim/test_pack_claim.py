@@ -9,7 +9,7 @@ from bms.cell import CellState, Disturbance, scaled
 from bms.errors import InputError
 from bms.model.pair import load_pair
 from hil_sim.run.workforce import InlineExecutor, Workforce
-from hil_sim.studies.pack.engine import Core, PackCharge, View, play
+from hil_sim.studies.pack.engine import Core, PackCharge, View, peak_limits, play
 from hil_sim.studies.pack.prediction import core_differences, surface_differences
 from hil_sim.studies.pack.reserves import Reserves, reserves
 from hil_sim.studies.pack.settings import PackSettings
@@ -20,7 +20,6 @@ from hil_sim.studies.pack.study import (
     WEAKEST,
     WITHOUT_RESERVES,
     group_name,
-    limits_of,
     run_packs,
     run_study,
 )
@@ -109,7 +108,7 @@ def test_the_claim_breaks_when_the_governing_cell_is_left_out_of_the_intersectio
     view = View(cells, tuple(range(len(cells))))
     charge = PackCharge(core, hot_cell_pack(), Surroundings(), view, 3600.0)
     play([charge], 4, np.random.default_rng(5))
-    over = charge.peaks() - limits_of(SETTINGS)
+    over = charge.peaks() - peak_limits(PRESET)
     assert charge.outcome == "complete"
     assert (over[2] > 0.0).any() == crosses
     assert not (over[[0, 1, 3]] > 0.0).any()

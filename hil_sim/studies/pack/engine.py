@@ -16,6 +16,7 @@ from bms.presets.schema import Sensor
 from hil_sim.native.cell_fields import cell_fields
 from hil_sim.plant.true_cell import COOLING_BAND_K
 from hil_sim.run.charge import OFF_PERIODS
+from hil_sim.studies.campaign.real_summary import OVERFILLED_SOC
 from hil_sim.studies.pack._pack import ffi, lib
 from hil_sim.studies.pack.reserves import Reserves
 from hil_sim.studies.pack.spread import PackDraw, Surroundings, memory_fields
@@ -54,12 +55,15 @@ def all_cells(cells: int, per_thermistor: int = 1) -> View:
     return View(every, tuple(min(first + middle, cells - 1) for first in groups))
 
 
-def peak_limits(preset: Preset, max_soc: float | None = None) -> Array:
-    """Limits of what PackCharge.peaks gives of each cell; `max_soc` in place of the preset's."""
+def peak_limits(preset: Preset) -> Array:
+    """Limits of what PackCharge.peaks gives of each cell.
+
+    A family's cell is full by its voltage; it is overfilled where a campaign says so too.
+    """
     limits = preset.limits
     return np.array(
         [
-            limits.max_soc if max_soc is None else max_soc,
+            limits.max_soc if preset.cell.interval is None else OVERFILLED_SOC,
             limits.max_core_temperature_K,
             limits.max_surface_temperature_K,
             limits.max_voltage_V,

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bms.arrays import Array
 from hil_sim.run.workforce import Workforce
-from hil_sim.studies.campaign.real_summary import OVERFILLED_SOC
 from hil_sim.studies.pack.engine import (
     Core,
     PackCharge,
@@ -79,14 +77,6 @@ def run_study(
             progress(len(done))
 
 
-def limits_of(settings: PackSettings) -> Array:
-    """Limits of what PackCharge.peaks gives of each cell.
-
-    A family's cell is full by its voltage; it is overfilled where a campaign says so too.
-    """
-    return peak_limits(settings.preset, OVERFILLED_SOC if settings.is_family else None)
-
-
 def _run_pack(
     settings: PackSettings, core: Core, views: dict[str, tuple[Core, View]], pack: int
 ) -> Row:
@@ -120,7 +110,7 @@ def _slowest_alone_s(
 
 def _figures(settings: PackSettings, charge: PackCharge) -> Row:
     peaks = charge.peaks()
-    over = peaks - limits_of(settings)
+    over = peaks - peak_limits(settings.preset)
     fields = charge.fields
     return {
         "outcome": charge.outcome,
