@@ -2,15 +2,49 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-BMS = (sys.executable, "-c", "from bms.cli import main; main()")
+# What the commands need is loaded once; each command runs in a fork of that, its output in files.
+FORKS = """
+import json, os, sys, traceback
+from importlib.metadata import entry_points
+from bms.cli import main
+from bms.imports import left_out
+with left_out("asammdf"):
+    for entry in entry_points(group="bms.commands"):
+        entry.load()
+
+def run(words, folder, out, err):
+    os.chdir(folder)
+    for path, number in (os.devnull, 0), (out, 1), (err, 2):
+        os.dup2(os.open(path, os.O_RDWR | os.O_CREAT), number)
+    sys.argv = ["bms", *words]
+    code = 0
+    try:
+        main()
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    except BaseException:
+        traceback.print_exc()
+        code = 1
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+for line in sys.stdin:
+    child = os.fork()
+    if child == 0:
+        run(*json.loads(line))
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
 # Without these the superuser has no more rights over files than their owner.
 RIGHTS = "-dac_override,-dac_read_search"
 AS_OWNER = ("setpriv", "--bounding-set", RIGHTS, "--inh-caps", RIGHTS)
@@ -54,19 +88,41 @@ COMMANDS = {
 }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", COMMANDS)
-def test_a_path_in_a_locked_folder_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def forks() -> Iterator[subprocess.Popen[str]]:
+    """A process without a superuser's rights that runs each command it is given in a fork."""
     if os.geteuid() == 0 and shutil.which("setpriv") is None:
         pytest.skip("the superuser may look at everything, and there is no setpriv")
+    prefix = AS_OWNER if os.geteuid() == 0 else ()
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    with subprocess.Popen(
+        [*prefix, sys.executable, "-c", FORKS],
+        env=environment,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        yield process
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_path_in_a_locked_folder_is_refused_in_one_line(
+    name: str,
+    forks: subprocess.Popen[str],
+    tmp_path: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
     locked = tmp_path / "a locked folder"
     locked.mkdir(mode=0o000)
     arguments = [word.replace("LOCKED", str(locked / "x")) for word in COMMANDS[name]]
-    prefix = AS_OWNER if os.geteuid() == 0 else ()
-    done = subprocess.run(
-        [*prefix, *BMS, *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    (line,) = done.stderr.splitlines()
-    assert (done.returncode, done.stdout) == (2, "")
+    said = tmp_path_factory.mktemp("said")
+    assert forks.stdin is not None
+    assert forks.stdout is not None
+    places = (str(tmp_path), str(said / "out"), str(said / "err"))
+    print(json.dumps([arguments, *places]), file=forks.stdin, flush=True)
+    code = int(forks.stdout.readline())
+    (line,) = (said / "err").read_text(encoding="utf-8").splitlines()
+    assert (code, (said / "out").read_text(encoding="utf-8")) == (2, "")
     assert line.startswith("bms: ")
     assert str(locked / "x") in line
