@@ -18,6 +18,7 @@ from hil_sim.studies.pack.reserves import NO_RESERVES
 from tests.hil_sim.pack_rig import PackLoop, PackRig, ordinary
 
 ONE_CELL, FAMILY = "paper_calibrated", "a123_26650_10C"
+WORST_K = ("surface_K", "estimate_K", "coolant_K")
 
 
 @cache
@@ -285,6 +286,45 @@ def test_a_family_s_cell_that_was_counted_fuller_than_it_is_told_is_bounded_by_t
             assert high == pytest.approx(min(counted + error, 1.0), abs=1e-6)
         else:
             assert high <= told + error + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("told", "bled", "begun"),
+    [
+        (0.4, None, [0.6, 0.6]),
+        (0.4, [0.0, 0.1], [0.6, 0.5]),
+        (0.55, [0.02, 0.1], [0.58, 0.55]),
+        (0.7, [0.0, 0.1], [0.7, 0.7]),
+    ],
+)
+def test_a_charge_begins_at_what_is_told_or_was_counted_less_what_was_bled_whichever_is_more(
+    told: float, bled: list[float] | None, begun: list[float]
+) -> None:
+    rig = charging(ONE_CELL)
+    rig.step(charge=False)
+    for cell in range(2):
+        lib.soc_set(ffi.addressof(rig.pack.cell[cell], "soc"), 0.6)
+    kept = ffi.NULL if bled is None else ffi.new("float[]", bled)
+    rig.socs = [told, told]
+    rig.voltages = [rig.core.preset.cell.ocv(soc) for soc in begun]
+    rig.step(charge=True, bled_soc=kept)
+    assert rig.pack.state == lib.BMS_CHARGING
+    counted = [rig.pack.cell[cell].soc.soc for cell in range(2)]
+    assert counted == pytest.approx(begun, abs=1e-6)
+    untold = [rig.pack.cell[cell].untold_soc for cell in range(2)]
+    assert untold == pytest.approx([soc - told for soc in begun], abs=1e-6)
+
+
+@pytest.mark.parametrize(("preset", "is_allowed"), [(ONE_CELL, True), (FAMILY, False)])
+def test_ahead_a_family_is_allowed_nothing_since_no_cell_stands_for_its_cells(
+    preset: str, is_allowed: bool
+) -> None:
+    rig = charging(preset)
+    worst = ffi.new("pack_worst_t *", {"soc": 0.5} | dict.fromkeys(WORST_K, 300.0))
+    horizon = ffi.new("pack_horizon_t *", {"horizon_s": 10.0})
+    allowed_A = lib.pack_function_A(rig.pack, worst, horizon)
+    assert (allowed_A < 0.0) is is_allowed
+    assert is_allowed or allowed_A == 0.0
 
 
 def test_no_command_is_stronger_than_the_calibration_s_strongest_by_a_rounding() -> None:

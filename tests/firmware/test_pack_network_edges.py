@@ -181,6 +181,24 @@ def test_measurements_in_one_period_are_counted_up_to_255_and_no_further(
     assert bench.ecu.state.measured_periods == counted
 
 
+@pytest.mark.parametrize(("step", "counted"), [(1, 1), (2, 2), (3, 3), (4, 1), (9, 1), (12, 1)])
+def test_a_frame_counts_for_those_lost_before_it_but_not_of_a_sender_that_starts_anew(
+    step: int, counted: int
+) -> None:
+    """A jump of more than may be lost is believed when the next frame goes on from there."""
+    bench = Bench()
+    bench.run(20)
+    bench.plant.measure()
+    first = next(f for f in bench.wire.publish(False) if f.frame_id == ELECTRICAL)
+    last = (first.data[1] & 0x0F) - 1  # that the ECU has had
+    jumps = [step] if step <= 3 else [step, step + 1]
+    for ahead in jumps:
+        frame = reprotected(first, (last + ahead) % 16)
+        bench.ecu.receive(frame.frame_id, frame.data)
+    bench.ecu._hand_on()
+    assert bench.ecu.state.measured_periods == counted
+
+
 @pytest.mark.parametrize(
     ("group_id", "page", "cell"), [(VOLTAGES, 1, 4), (TEMPERATURES, 0, 6), (TEMPERATURES, 1, 2)]
 )
