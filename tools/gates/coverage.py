@@ -28,6 +28,13 @@ from tools.gates.records import gates, keep
 ROOT = Path(__file__).resolve().parents[2]
 COMPILER = ROOT / "tools" / "gates" / "clang_coverage.sh"
 RECORD = ROOT / "tools" / "gates" / "coverage.toml"
+EXTENSIONS = {
+    "bms.native_build.FIRMWARE": "",
+    "hil_sim.studies.pack.native_build.PACK": (
+        f"-fprofile-list={ROOT / 'tools' / 'gates' / 'coverage_packs.list'}"
+    ),
+}
+"""What is built, and the compiler's flags for it. Of the packs' nothing of the core is counted."""
 Place = tuple[int, int, int, int]
 
 
@@ -77,9 +84,10 @@ class FileCoverage:
 
 def build_extensions(out: Path) -> list[Path]:
     """The extensions of firmware and packs, made by the coverage compiler."""
-    environment = {**os.environ, "CC": str(COMPILER), "LDSHARED": f"{COMPILER} -shared"}
     built = []
-    for native in ("bms.native_build.FIRMWARE", "hil_sim.studies.pack.native_build.PACK"):
+    for native, flags in EXTENSIONS.items():
+        environment = {**os.environ, "CC": str(COMPILER), "LDSHARED": f"{COMPILER} -shared"}
+        environment["CFLAGS"] = flags
         module, _, name = native.rpartition(".")
         program = (
             f"import pathlib, sys; from {module} import {name} as native; "
