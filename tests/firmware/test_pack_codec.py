@@ -87,8 +87,12 @@ def test_a_command_is_rounded_towards_none(codec: Any) -> None:
     """In steps of 2 mA: what lies between two of them is the weaker one."""
     _, lib = codec
     for current_A, sent_A in ((-9.9999, -9.998), (-10.0, -10.0), (-10.0019, -10.0)):
-        bits = lib.pack_with_value(lib.PACK_SIGNAL_COMMAND_CURRENT, current_A, lib.CODEC_TOWARDS_ZERO)
-        assert lib.pack_value(bits, lib.PACK_SIGNAL_COMMAND_CURRENT) == pytest.approx(sent_A, abs=1e-5)
+        bits = lib.pack_with_value(
+            lib.PACK_SIGNAL_COMMAND_CURRENT, current_A, lib.CODEC_TOWARDS_ZERO
+        )
+        assert lib.pack_value(bits, lib.PACK_SIGNAL_COMMAND_CURRENT) == pytest.approx(
+            sent_A, abs=1e-5
+        )
 
 
 def test_a_group_has_its_own_identifiers_and_no_others(codec: Any) -> None:
@@ -134,7 +138,7 @@ def test_places_of_a_page_beyond_its_cells_are_not_available(codec: Any, count: 
 
 
 def test_all_that_an_ecu_says_in_a_period_fits_into_its_outbox(codec: Any) -> None:
-    """Every message in the same period, as in the first, and the pages of each group that is sent."""
+    """Every message at once, as in the first period, and the pages of each group that is sent."""
     _, lib = codec
     sent = (lib.PACK_GROUP_CELL_CORES, lib.PACK_GROUP_CELL_CHARGES, lib.PACK_GROUP_CELL_BLEEDS)
     pages = [lib.PACK_GROUPS[group].pages_a_period for group in sent]

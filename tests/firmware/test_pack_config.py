@@ -1,4 +1,4 @@
-"""Which packs there can be: each condition on a configuration, broken alone; what is refused stays so."""
+"""Which packs there can be: each condition on a configuration, broken alone."""
 
 from __future__ import annotations
 

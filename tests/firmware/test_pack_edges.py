@@ -57,8 +57,10 @@ def charging(preset: str, cells: int = 2, **options: Any) -> PackRig:
 
 
 def hot_beside_full(hot: int, strength_A: float) -> tuple[PackRig, float]:
-    """Of two cells the hot one, which cools while it is charged, has to be, with `least_A` at least;
-    the other one has room for no more than `strength_A`, since it is full soon."""
+    """A pack of two cells, and the least current in A that the hot one has to be charged with.
+
+    It cools by that; the other one has room for no more than `strength_A`, since it is full soon.
+    """
     rig = fresh(ONE_CELL, 2)
     calibration, k = rig.core.calibration, rig.core.calibration.rcbf
     k.a2_per_As, k.estimation_error_bound_K = -2e-5, 0.0
@@ -82,7 +84,7 @@ def hot_beside_full(hot: int, strength_A: float) -> tuple[PackRig, float]:
 
 @pytest.mark.parametrize("hot", [0, 1])
 def test_cells_of_which_one_needs_more_than_another_bears_get_nothing(hot: int) -> None:
-    """What the one needs at least is the root of its condition; which comes first does not matter."""
+    """What the one needs is the root of its condition; which of them is first does not matter."""
     _, least_A = hot_beside_full(hot, 5.0)
     assert 0.5 < least_A < 3.0
     rig, _ = hot_beside_full(hot, 1.02 * least_A)
@@ -157,7 +159,10 @@ def test_a_state_of_charge_that_cannot_be_makes_a_request_invalid_of_whatever_ce
         told = list(rig.socs)
         rig.socs[cell] = soc
         rig.step(charge=True)
-        assert (rig.pack.state, rig.pack.monitor.active) == (lib.BMS_STANDBY, bit("REQUEST_INVALID"))
+        assert (rig.pack.state, rig.pack.monitor.active) == (
+            lib.BMS_STANDBY,
+            bit("REQUEST_INVALID"),
+        )
         rig.socs = told
         rig.step()
         assert rig.pack.state == lib.BMS_CHARGING
@@ -182,7 +187,10 @@ INPUTS = ("current_A", "cooling_power_W", "surface", "coolant")
 
 
 def estimated(name: str, value: float, beside_K: float) -> tuple[float, bool]:
-    """A cell's first estimate in K, and whether it is one, with one input and surface and coolant at a temperature beside it."""
+    """A cell's first estimate in K, and whether it is one, at a value of the input of that name.
+
+    Surface and coolant, where they are not that input, are at `beside_K`.
+    """
     rig = fresh(ONE_CELL, 1)
     surface_K = value if name == "surface" else beside_K
     coolant_K = value if name == "coolant" else beside_K

@@ -1,4 +1,4 @@
-"""A pack's ECU where frames are damaged, of no pack, too many or too few, or it has no constants."""
+"""A pack's ECU where frames are damaged, too many or too few, or it has no constants."""
 
 from __future__ import annotations
 

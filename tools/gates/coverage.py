@@ -94,7 +94,9 @@ def build_extensions(out: Path) -> list[Path]:
             "print(native.builder(tree=pathlib.Path(sys.argv[1])).compile(tmpdir=sys.argv[2]))"
         )
         command = [sys.executable, "-c", program, str(ROOT), str(out)]
-        done = subprocess.run(command, cwd=ROOT, env=environment, check=True, stdout=subprocess.PIPE)
+        done = subprocess.run(
+            command, cwd=ROOT, env=environment, check=True, stdout=subprocess.PIPE
+        )
         built.append(Path(done.stdout.decode().strip().splitlines()[-1]))
     return built
 
