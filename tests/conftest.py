@@ -16,6 +16,7 @@ from bms.native_build import FIRMWARE
 from bms.studies.rivals.native_build import RIVALS
 from hil_sim.native.native_build import NATIVE
 from hil_sim.studies.campaign.native_build import RUNNER
+from hil_sim.studies.pack.native_build import PACK
 from tools.long_checks import load_checks
 
 # The machine may be busy with other tests; time is measured in benchmarks only.
@@ -31,20 +32,25 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         type=Path,
         help="folder of a variant made by 'python -m bms.native_build', used instead",
     )
+    parser.addoption(
+        "--pack-build", type=Path, help="folder of a variant of the packs' extension, used instead"
+    )
     parser.addoption("--long", metavar="GROUP", help="the long tests of this group and no others")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Put a variant in the place of the installed extension; refuse extensions of other sources."""
+    """Put variants in the place of installed extensions; refuse extensions of other sources."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         # As a shell does for what it starts in the background; all children would inherit it.
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    folder = config.getoption("--firmware-build")
-    if folder is not None:
-        FIRMWARE.load_build(folder)
-    for extension in (
-        (RIVALS, NATIVE, RUNNER) if folder is not None else (FIRMWARE, RIVALS, NATIVE, RUNNER)
+    for extension, option in (
+        *((FIRMWARE, "--firmware-build"), (PACK, "--pack-build")),
+        *((RIVALS, None), (NATIVE, None), (RUNNER, None)),
     ):
+        folder = None if option is None else config.getoption(option)
+        if folder is not None:
+            extension.load_build(folder)
+            continue
         if extension.is_stale(import_module(extension.module)):
             raise pytest.UsageError(
                 f"{extension.module} was built from other C sources than lie here now; "

@@ -28,24 +28,31 @@ static bool bare_is_valid(const pack_bare_t *bare)
     return is_valid;
 }
 
-/* Each thermistor is at one cell, so that no cell passes for another. */
+/* Each thermistor is at one cell, so that no cell passes for another and none has no cell. */
 static bool map_is_valid(const pack_config_t *config)
 {
-    bool has_bare = false;
+    uint32_t owners = 0u;
     for (uint32_t i = 0u; i < config->cells; i++) {
         const uint8_t thermistor = config->thermistor_of[i];
-        has_bare = has_bare || (thermistor == PACK_NO_THERMISTOR);
-        if ((thermistor != PACK_NO_THERMISTOR) && (thermistor >= config->thermistors)) {
+        if (thermistor == PACK_NO_THERMISTOR) {
+            continue;
+        }
+        if (thermistor >= config->thermistors) {
             return false;
         }
         for (uint32_t j = 0u; j < i; j++) {
-            if ((thermistor != PACK_NO_THERMISTOR) && (thermistor == config->thermistor_of[j])) {
+            if (thermistor == config->thermistor_of[j]) {
                 return false;
             }
         }
+        owners++;
     }
-    return !has_bare || ((config->calibration->family.is_stated == 0u) &&
-                         (config->thermistors > 0u) && bare_is_valid(&config->bare));
+    if (owners != config->thermistors) {
+        return false;
+    }
+    return (owners == config->cells) ||
+           ((config->calibration->family.is_stated == 0u) && (owners > 0u) &&
+            bare_is_valid(&config->bare));
 }
 
 static bool config_is_valid(const pack_config_t *config)
@@ -56,8 +63,7 @@ static bool config_is_valid(const pack_config_t *config)
     }
     const uint32_t most = (config->calibration->family.is_stated != 0u) ? BMS_MAX_FAMILY_CELLS
                                                                         : BMS_MAX_CELLS;
-    return (config->cells >= 1u) && (config->cells <= most) &&
-           (config->thermistors <= config->cells) && map_is_valid(config);
+    return (config->cells >= 1u) && (config->cells <= most) && map_is_valid(config);
 }
 
 void pack_init(pack_t *pack, const pack_config_t *config)
@@ -304,7 +310,10 @@ static void run_period(pack_t *pack, const pack_readings_t *readings)
     const bool may_charge = pack_is_charging(pack) && !pack->monitor.stop &&
                             pack->decision.decision.feasible;
     follow_growth(pack);
-    pack->command_A = may_charge ? pack->decision.decision.current_A : 0.0f;
+    /* By its roundings a family's decision may be a step of float32 stronger than what was wanted. */
+    pack->command_A = may_charge ? numeric_larger(pack->calibration->reference_current_A,
+                                                  pack->decision.decision.current_A)
+                                 : 0.0f;
 }
 
 void pack_step(pack_t *pack, const pack_readings_t *readings)

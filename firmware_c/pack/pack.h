@@ -97,7 +97,7 @@ typedef struct {
     bool soc_known;
     pack_bare_t bare;
     monitor_t monitor;
-    uint8_t symptom_cell; /* the first with a symptom of the last period that is a cell's own */
+    uint8_t symptom_cell; /* the first with a symptom of the last period; 0 for one that all share */
     uint8_t limit_cell;   /* that kept the current from growing freely, last */
     rcbf_active_t limit;
     float growth_A; /* most that the command may grow by in the coming period */

@@ -41,7 +41,7 @@ static void bound_surface(pack_t *pack, pack_cell_t *cell, const pack_cell_readi
                           float current_A, float start_K)
 {
     const pack_bare_t *bare = &pack->bare;
-    if (!cell->thermal.is_known && !(reading->is_coolant_usable && numeric_is_finite(start_K))) {
+    if (!cell->thermal.is_known && (!reading->is_coolant_usable || !numeric_is_finite(start_K))) {
         return; /* the estimate stays outside of its domain */
     }
     thermal_constants_t own = pack->calibration->thermal;

@@ -47,8 +47,7 @@ static bool is_to_bleed(const pack_ecu_t *ecu, uint32_t cell, float lowest_soc)
 {
     const float soc = soc_of(ecu, cell);
     const float least_gap = (ecu->bleeds[cell] != 0u) ? 0.0f : ecu->balance.least_gap;
-    return (ecu->voltage_V[cell] > 0.0f) && (soc >= ecu->balance.least_soc) &&
-           (soc - lowest_soc > least_gap);
+    return (soc >= ecu->balance.least_soc) && (soc - lowest_soc > least_gap);
 }
 
 static void bleed_none(pack_ecu_t *ecu)

@@ -28,7 +28,7 @@ extern "C" {
 #define PACK_ECU_SENT 3
 
 #define PACK_ECU_MESSAGES 3
-#define PACK_ECU_OUTBOX 16
+#define PACK_ECU_OUTBOX 16 /* holds all messages and the pages of a period */
 
 /* In place of a cell's number on the bus, where they count from 1: none. */
 #define PACK_ECU_NO_CELL 0

@@ -143,15 +143,15 @@ static void forget_page(pack_ecu_t *ecu, uint32_t group, uint32_t page)
 /* Cell that a value of a group is of. */
 static uint8_t cell_of(const pack_ecu_t *ecu, uint32_t group, uint32_t index)
 {
+    uint8_t cell = (uint8_t)index;
     if (group == PACK_GROUP_CELL_TEMPERATURES) {
         for (uint32_t i = 0u; i < ecu->pack.cells; i++) {
             if (ecu->pack.cell[i].thermistor == index) {
-                return (uint8_t)i;
+                cell = (uint8_t)i;
             }
         }
-        return PACK_NO_CELL;
     }
-    return (uint8_t)index;
+    return cell;
 }
 
 /* The messages of a period count together. One that has fallen behind in a queue since the charge

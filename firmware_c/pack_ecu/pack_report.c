@@ -10,9 +10,6 @@
 /* The bus carries the first half of it. */
 #define PRESET_HASH_SHIFT 16u
 
-/* More pages a period than this would not fit into the outbox. */
-#define MOST_PAGES ((PACK_ECU_OUTBOX - PACK_TRANSMITTED_COUNT) / PACK_ECU_SENT)
-
 static uint32_t number_of(uint8_t cell)
 {
     return (cell == PACK_NO_CELL) ? PACK_ECU_NO_CELL : ((uint32_t)cell + 1u);
@@ -155,8 +152,7 @@ static void queue_pages(pack_ecu_t *ecu, uint32_t group)
 {
     const uint32_t pages = pack_pages(ecu->pack.cells);
     uint8_t *turn = &ecu->turn[group - PACK_GROUP_CELL_CORES];
-    for (uint32_t i = 0u; (i < PACK_GROUPS[group].pages_a_period) && (i < pages) && (i < MOST_PAGES);
-         i++) {
+    for (uint32_t i = 0u; (i < PACK_GROUPS[group].pages_a_period) && (i < pages); i++) {
         queue_page(ecu, group, *turn);
         *turn = (uint8_t)((*turn + 1u) % pages);
     }

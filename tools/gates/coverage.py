@@ -1,4 +1,5 @@
-"""Branch and MC/DC coverage of the C core by the selected tests, held against a record.
+"""Branch and MC/DC coverage of the C core and of what packs add by the selected tests, held against
+a record.
 
     python -m tools.gates.coverage [--out FOLDER]
 
@@ -27,6 +28,13 @@ from tools.gates.records import gates, keep
 ROOT = Path(__file__).resolve().parents[2]
 COMPILER = ROOT / "tools" / "gates" / "clang_coverage.sh"
 RECORD = ROOT / "tools" / "gates" / "coverage.toml"
+EXTENSIONS = {
+    "bms.native_build.FIRMWARE": "",
+    "hil_sim.studies.pack.native_build.PACK": (
+        f"-fprofile-list={ROOT / 'tools' / 'gates' / 'coverage_packs.list'}"
+    ),
+}
+"""What is built, and the compiler's flags for it. Of the packs' nothing of the core is counted."""
 Place = tuple[int, int, int, int]
 
 
@@ -74,12 +82,23 @@ class FileCoverage:
         return found
 
 
-def build_extension(out: Path) -> Path:
-    """The firmware's extension, made by the coverage compiler."""
-    environment = {**os.environ, "CC": str(COMPILER), "LDSHARED": f"{COMPILER} -shared"}
-    command = [sys.executable, "-m", "bms.native_build", "--tree", str(ROOT), "--out", str(out)]
-    done = subprocess.run(command, cwd=ROOT, env=environment, check=True, stdout=subprocess.PIPE)
-    return Path(done.stdout.decode().strip().splitlines()[-1])
+def build_extensions(out: Path) -> list[Path]:
+    """The extensions of firmware and packs, made by the coverage compiler."""
+    built = []
+    for native, flags in EXTENSIONS.items():
+        environment = {**os.environ, "CC": str(COMPILER), "LDSHARED": f"{COMPILER} -shared"}
+        environment["CFLAGS"] = flags
+        module, _, name = native.rpartition(".")
+        program = (
+            f"import pathlib, sys; from {module} import {name} as native; "
+            "print(native.builder(tree=pathlib.Path(sys.argv[1])).compile(tmpdir=sys.argv[2]))"
+        )
+        command = [sys.executable, "-c", program, str(ROOT), str(out)]
+        done = subprocess.run(
+            command, cwd=ROOT, env=environment, check=True, stdout=subprocess.PIPE
+        )
+        built.append(Path(done.stdout.decode().strip().splitlines()[-1]))
+    return built
 
 
 def run_tests(record: Record, out: Path) -> None:
@@ -91,7 +110,9 @@ def run_tests(record: Record, out: Path) -> None:
     }
     command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "loadfile"]
     command += ["-p", "no:cacheprovider", "--hypothesis-seed=0", "--no-header"]
-    command += ["--firmware-build", str(out / "extension"), "--basetemp", str(out / "tests")]
+    for option in ("--firmware-build", "--pack-build"):
+        command += [option, str(out / "extension")]
+    command += ["--basetemp", str(out / "tests")]
     command += [*record.options, *record.tests]
     subprocess.run(command, cwd=ROOT, env=environment, check=True)
 
@@ -133,9 +154,9 @@ def measure(record: Record, out: Path) -> dict[str, FileCoverage]:
     """Build, run the tests, and read what they reached."""
     shutil.rmtree(out, ignore_errors=True)
     (out / "raw").mkdir(parents=True)
-    extension = build_extension(out / "extension")
+    extensions = build_extensions(out / "extension")
     run_tests(record, out)
-    libraries = [extension, *sorted((out / "tests").rglob("*.so"))]
+    libraries = [*extensions, *sorted((out / "tests").rglob("*.so"))]
     return coverage_of(export(libraries, out), record)
 
 
