@@ -1,5 +1,6 @@
 """Training is reproducible, learns, and reports errors that an independent evaluation finds."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -210,7 +211,7 @@ def test_rounds_of_refinement_go_on_as_long_as_they_help():
     assert len(after_epochs) == 1 + 4
     assert len(after_fit) < 1 + 4
     errors = [mean_square(layers, x, target) for layers in after_fit]
-    left = [after / before for before, after in zip(errors, errors[1:])]
+    left = [after / before for before, after in itertools.pairwise(errors)]
     assert all(share <= 0.999 for share in left[:-1])
     assert left[-1] > 0.999
 
