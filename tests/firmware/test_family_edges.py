@@ -185,6 +185,21 @@ def test_at_rest_the_surface_tells_the_hottest_core(
     assert family.core_room_K == pytest.approx(323.0 - hottest_K, abs=1e-3)
 
 
+@pytest.mark.parametrize(("known_room_K", "told"), [(10.0, True), (22.0, False)])
+def test_what_the_surface_tells_at_rest_is_believed_where_it_is_cooler(
+    code: FamilyCode, known_room_K: float, told: bool
+) -> None:
+    """A surface that was 3 K warmer on average says less of the core than what is known already."""
+    k, family = code.k, code.observer()
+    family.rest = {"count": k.rest_periods - 1, "first_K": 300.0, "sum_K": 3.0 * k.rest_periods}
+    family.core_is_known, family.core_room_K = True, known_room_K
+    at_rest = {"surface_temperature_K": 300.0, "coolant_temperature_K": 300.0}
+    code.observe(family, code.reading(**at_rest))
+    told_K = 323.0 - (303.0 + k.rest_error_K + k.rest_periods * k.heating_K_per_W * family.heat_W)
+    assert 10.0 < told_K < 22.0
+    assert family.core_room_K == pytest.approx(told_K if told else known_room_K, abs=0.2)
+
+
 @pytest.mark.parametrize("current_A", [0.0, 3.0])
 def test_no_current_and_a_load_raise_no_voltage(code: FamilyCode, current_A: float) -> None:
     family, deviation_V = started(code), 0.01
