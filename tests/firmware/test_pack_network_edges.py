@@ -164,15 +164,20 @@ def reprotected(frame: Frame, counter: int) -> Frame:
     return frame._replace(data=bytes(data))
 
 
+def bench_with_next_measurement() -> tuple[Bench, Frame]:
+    """A bench that has run, and a frame that its ECU has not had yet."""
+    bench = Bench()
+    bench.run(20)
+    bench.plant.measure()
+    return bench, next(f for f in bench.wire.publish(False) if f.frame_id == ELECTRICAL)
+
+
 @pytest.mark.parametrize(("frames", "counted"), [(1, 1), (254, 254), (255, 255), (300, 255)])
 def test_measurements_in_one_period_are_counted_up_to_255_and_no_further(
     frames: int, counted: int
 ) -> None:
     """A count that wrapped around would make a lagging ECU look punctual."""
-    bench = Bench()
-    bench.run(20)
-    bench.plant.measure()
-    first = next(f for f in bench.wire.publish(False) if f.frame_id == ELECTRICAL)
+    bench, first = bench_with_next_measurement()
     counter = first.data[1] & 0x0F
     for step in range(frames):
         frame = reprotected(first, (counter + step) % 16)
@@ -186,10 +191,7 @@ def test_a_frame_counts_for_those_lost_before_it_but_not_of_a_sender_that_starts
     step: int, counted: int
 ) -> None:
     """A jump of more than may be lost is believed when the next frame goes on from there."""
-    bench = Bench()
-    bench.run(20)
-    bench.plant.measure()
-    first = next(f for f in bench.wire.publish(False) if f.frame_id == ELECTRICAL)
+    bench, first = bench_with_next_measurement()
     last = (first.data[1] & 0x0F) - 1  # that the ECU has had
     jumps = [step] if step <= 3 else [step, step + 1]
     for ahead in jumps:

@@ -103,7 +103,7 @@ def test_no_row_of_the_default_preset_needs_an_excuse():
 def test_the_sum_of_the_cells_tells_a_wrong_one_by_more_than_all_errors_together(off_V):
     """From both sides: so many cells that the errors are just below, and just above the offset."""
     preset, model = load_pair("samsung_30q", None)
-    (fault,) = (fault for fault in FAULTS if fault.name == "a cell's voltage off by 0.3 V")
+    (fault,) = (one for one in FAULTS if one.name == f"a cell's voltage off by {CELL_OFFSET_V:g} V")
     known_V = [PackChargeSettings(preset, model, n).pack_voltage_error_V for n in range(1, 193)]
     cells = next(n for n, error_V in enumerate(known_V, 1) if error_V >= CELL_OFFSET_V)
     settings = PackChargeSettings(preset, model, cells if off_V > 0.0 else cells - 1)
